@@ -1,0 +1,1 @@
+"""Benchmarks: fps against character count, kernel cases with peers beside them."""

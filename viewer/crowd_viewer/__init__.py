@@ -1,0 +1,1 @@
+"""Placeholder package of the renderer."""
