@@ -1,1 +1,146 @@
-"""placeholder"""
+"""Everything that changes while a simulation runs: one array per quantity, leading axis = character.
+
+Rows are slots; a slot without a person has ``is_active`` False and its other values mean nothing.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.motion.clip_table import PADDED_JOINTS
+
+FloatArray = npt.NDArray[np.float64]
+Float32Array = npt.NDArray[np.float32]
+IntArray = npt.NDArray[np.int32]
+LongArray = npt.NDArray[np.int64]
+ByteArray = npt.NDArray[np.uint8]
+BoolArray = npt.NDArray[np.bool_]
+
+
+def _array(*shape: int, dtype: Any = np.float64, fill: float = 0) -> Any:
+    return field(metadata={"shape": shape, "dtype": dtype, "fill": fill})
+
+
+@dataclass
+class State:
+    """Structure of arrays. Ground vectors are (character, 3) with y = 0; feet are ordered right, left."""
+
+    is_active: BoolArray = _array(dtype=np.bool_)
+    """The slot holds a person who is in the scene. (character,)"""
+    is_finished: BoolArray = _array(dtype=np.bool_)
+    """The person has reached the last goal, or never had one. (character,)"""
+    spawn_count: LongArray = _array(dtype=np.int64)
+    """How often a person has entered through this slot; keys random choices. (character,)"""
+
+    position_world: FloatArray = _array(3)
+    """Root on the ground, m. (character, 3)"""
+    previous_position_world: FloatArray = _array(3)
+    """Root one step ago, m. (character, 3)"""
+    yaw: FloatArray = _array()
+    """Heading about +y, 0 faces +z, left positive, rad in (-pi, pi]. (character,)"""
+    velocity_world: FloatArray = _array(3)
+    """Realised velocity of the root in the last step, m/s. (character, 3)"""
+
+    goal_index: IntArray = _array(dtype=np.int32)
+    """Which goal of the character's list it walks to. (character,)"""
+    wait_until: FloatArray = _array()
+    """The character stands until this time, s. (character,)"""
+    wants_to_walk: BoolArray = _array(dtype=np.bool_)
+    """The character has a goal and is not waiting. (character,)"""
+    wanted_speed: FloatArray = _array()
+    """Speed at which the character would like to walk now, m/s. (character,)"""
+    way_point_world: FloatArray = _array(3)
+    """Point that the character walks to next, m. (character, 3)"""
+    remaining_distance: FloatArray = _array()
+    """Length of the way to the goal, m. (character,)"""
+    preferred_velocity_world: FloatArray = _array(3)
+    """Velocity that the character would have if it were alone, m/s. (character, 3)"""
+    desired_velocity_world: FloatArray = _array(3)
+    """Velocity after avoidance, m/s. (character, 3)"""
+    heading_velocity_world: FloatArray = _array(3)
+    """Smoothed desired velocity; the character turns towards it, m/s. (character, 3)"""
+    turning_side: ByteArray = _array(dtype=np.int8)
+    """Side of the present turn: 1 left, -1 right; keeps a character that must turn round from wavering. (character,)"""
+
+    is_directed: BoolArray = _array(dtype=np.bool_)
+    """Locomotion parameters come from a command instead of steering. (character,)"""
+    directed_parameter: FloatArray = _array(3)
+    """Commanded forward speed, turn rate, side speed, where `is_directed`; m/s, rad/s, m/s. (character, 3)"""
+    locomotion_parameter: FloatArray = _array(3)
+    """Forward speed, turn rate, side speed that locomotion realises now; m/s, rad/s, m/s. (character, 3)"""
+    is_moving: BoolArray = _array(dtype=np.bool_)
+    """The locomotion layer is wanted: the character walks, turns, or is about to. (character,)"""
+    locomotion_weight: FloatArray = _array()
+    """Share of the locomotion layer in the pose: 0 idle, 1 moving. (character,)"""
+    locomotion_weight_rate: FloatArray = _array()
+    """Rate of change of `locomotion_weight`, 1/s. (character,)"""
+    phase: FloatArray = _array()
+    """Gait phase in cycles in [0, 2); right heel strikes at 0 and 1, left at 0.5 and 1.5. (character,)"""
+    cycle_rate: FloatArray = _array()
+    """Gait cycles per second of the present blend. (character,)"""
+    example: IntArray = _array(4, dtype=np.int32)
+    """Locomotion examples that are blended. (character, 4)"""
+    example_weight: FloatArray = _array(4)
+    """Weights of the examples: all >= 0, sum 1. (character, 4)"""
+
+    idle_clip: IntArray = _array(2, dtype=np.int32)
+    """Idle variation that is left and the one that is entered, as indices of the idle clips. (character, 2)"""
+    idle_time: FloatArray = _array(2)
+    """Clip time of both, s. (character, 2)"""
+    idle_mix: FloatArray = _array(fill=1)
+    """Progress from the first idle variation to the second, 0 to 1. (character,)"""
+    idle_until: FloatArray = _array()
+    """Simulation time at which the next idle variation is chosen, s. (character,)"""
+
+    play_clip: IntArray = _array(dtype=np.int32, fill=-1)
+    """Clip that the animation layer plays, -1 for none. (character,)"""
+    play_time: FloatArray = _array()
+    """Time since the play began, s. (character,)"""
+    play_end: FloatArray = _array()
+    """Length of the play with its repetitions, s; infinite for one without end. (character,)"""
+    play_weight: FloatArray = _array()
+    """Share of the played clip on the joints of its mask, 0 to 1. (character,)"""
+    play_weight_rate: FloatArray = _array()
+    """Rate of change of `play_weight`, 1/s. (character,)"""
+    play_queued: IntArray = _array(dtype=np.int32, fill=-1)
+    """Clip that follows the present one, -1 for none. (character,)"""
+    play_queued_length: FloatArray = _array()
+    """Length of the play that follows, s. (character,)"""
+
+    pose_rotation: Float32Array = _array(4 * PADDED_JOINTS, dtype=np.float32)
+    """Local joint rotations, components outermost: w of all joints, then x, y, z. (character, 256)"""
+    pose_pelvis: Float32Array = _array(3, dtype=np.float32)
+    """Pelvis in the root frame at leg scale 1, m. (character, 3)"""
+
+    foot_contact: ByteArray = _array(2, dtype=np.uint8)
+    """Contact of each foot: 0 swing, 1 heel, 2 ball. (character, 2)"""
+    foot_point_world: FloatArray = _array(2, 2, 3)
+    """Heel and ball of each foot in the final pose, m. (character, foot, point, 3)"""
+
+    @classmethod
+    def create(cls, capacity: int) -> "State":
+        """Make the arrays for `capacity` slots, all empty."""
+        arrays = {}
+        for declared in fields(cls):
+            shape = (capacity, *declared.metadata["shape"])
+            arrays[declared.name] = np.full(shape, declared.metadata["fill"], dtype=declared.metadata["dtype"])
+        return cls(**arrays)
+
+    @property
+    def capacity(self) -> int:
+        """Number of slots."""
+        return int(self.is_active.shape[0])
+
+    def arrays(self) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+        """Names and arrays of all fields, in declared order."""
+        for declared in fields(self):
+            yield declared.name, getattr(self, declared.name)
+
+    def clear(self, characters: IntArray) -> None:
+        """Set all values of these slots back to those of an empty slot; `spawn_count` is kept."""
+        for declared in fields(self):
+            if declared.name != "spawn_count":
+                getattr(self, declared.name)[characters] = declared.metadata["fill"]
