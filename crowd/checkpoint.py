@@ -1,0 +1,101 @@
+"""Save and restore everything that changes in a run, in one file.
+
+A restored simulation continues with the same bits as one that was never stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.errors import RecordingError, describe
+
+if TYPE_CHECKING:
+    from crowd.simulation import Simulation
+
+FORMAT = 1
+
+
+def state_arrays(simulation: Simulation) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """All arrays that change in a run, with unique names."""
+    for name, array in simulation.state.arrays():
+        yield f"state.{name}", array
+    for part, owner in simulation.stateful_parts():
+        for name, array in owner.state_fields().items():
+            yield f"{part}.{name}", array
+
+
+def save(simulation: Simulation, path: str | os.PathLike[str]) -> None:
+    """Write a checkpoint; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    path : path
+        Usually ends in ``.npz``.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be written.
+    """
+    target = Path(path)
+    facts = {
+        "format": FORMAT,
+        "scenario": simulation.scenario.name,
+        "capacity": simulation.model.capacity,
+        "seed": simulation.seed,
+        "bodies": simulation.bodies,
+        "step_index": simulation.step_index,
+    }
+    arrays = dict(state_arrays(simulation))
+    partial = target.with_name(target.name + ".partial")
+    try:
+        with partial.open("wb") as file:
+            np.savez(file, facts=np.array(json.dumps(facts)), allow_pickle=False, **arrays)
+        partial.replace(target)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise RecordingError(describe(str(target), "cannot write the checkpoint", error.strerror)) from error
+
+
+def restore(simulation: Simulation, path: str | os.PathLike[str]) -> None:
+    """Load a checkpoint into a simulation of the same scenario, number of people and seed.
+
+    Raises
+    ------
+    RecordingError
+        The file is no checkpoint, or belongs to another run.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            facts = json.loads(str(stored["facts"]))
+            contents = {name: stored[name] for name in stored.files if name != "facts"}
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise RecordingError(describe(str(path), "is not a checkpoint", str(error).splitlines()[0])) from error
+    expected = {
+        "format": FORMAT,
+        "scenario": simulation.scenario.name,
+        "capacity": simulation.model.capacity,
+        "seed": simulation.seed,
+        "bodies": simulation.bodies,
+    }
+    for key, value in expected.items():
+        if facts.get(key) != value:
+            raise RecordingError(
+                describe(str(path), f"checkpoint of another run: {key}", facts.get(key), repr(value))
+            )
+    for name, array in state_arrays(simulation):
+        stored_array = contents.get(name)
+        if stored_array is None or stored_array.shape != array.shape:
+            raise RecordingError(describe(str(path), f"checkpoint lacks {name}", allowed=f"shape {array.shape}"))
+        array[...] = stored_array
+    simulation.step_index = int(facts["step_index"])
+    simulation.model.update_world(simulation.time)

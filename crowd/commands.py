@@ -1,0 +1,124 @@
+"""What a program asks of characters between two steps: goals, direct locomotion, plays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.errors import SettingsError, describe
+from crowd.motion.clip import ClipKind
+
+if TYPE_CHECKING:
+    from crowd.simulation import Simulation
+
+Characters = int | slice | Sequence[int] | npt.NDArray[np.integer]
+
+
+class Commands:
+    """Commands take effect in the next step; they write the state at once, so a saved state contains them."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+
+    def set_goal(self, characters: Characters, goal_world: npt.ArrayLike, radius: float = 0.3) -> None:
+        """Send characters to a point; it replaces what is left of their goal lists.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+            Rows of the state.
+        goal_world : (2,), (3,), (M, 2) or (M, 3) array
+            Ground point x, z (or x, y, z), one for all or one each, m.
+        radius : float
+            Distance at which the goal counts as reached, m, > 0.
+
+        Raises
+        ------
+        SettingsError
+            A goal is not finite, is inside an obstacle, or cannot be reached.
+        """
+        rows = self._rows(characters)
+        goals = np.atleast_2d(np.asarray(goal_world, dtype=np.float64))
+        if goals.shape[1] == 2:
+            goals = np.stack([goals[:, 0], np.zeros(len(goals)), goals[:, 1]], axis=1)
+        goals = np.broadcast_to(goals, (rows.size, 3))
+        if not np.isfinite(goals).all():
+            raise SettingsError(describe("set_goal", "goal must be finite", allowed="numbers in metres"))
+        if not radius > 0:
+            raise SettingsError(describe("set_goal", "radius must be positive", radius, "> 0 m"))
+        self._simulation.send(rows, np.ascontiguousarray(goals), radius)
+
+    def set_locomotion(self, characters: Characters, parameters: npt.ArrayLike) -> None:
+        """Command forward speed, turn rate and side speed directly; steering is ignored until `release`.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+        parameters : (3,) or (M, 3) array
+            Forward speed m/s, turn rate rad/s (left positive), side speed m/s (left positive). Values outside
+            the locomotion hull are realised as the nearest ones inside.
+        """
+        rows = self._rows(characters)
+        values = np.broadcast_to(np.asarray(parameters, dtype=np.float64), (rows.size, 3))
+        if not np.isfinite(values).all():
+            raise SettingsError(describe("set_locomotion", "parameters must be finite", allowed="m/s, rad/s, m/s"))
+        state = self._simulation.state
+        state.is_directed[rows] = True
+        state.directed_parameter[rows] = values
+
+    def release(self, characters: Characters) -> None:
+        """Give characters back to navigation and steering."""
+        self._simulation.state.is_directed[self._rows(characters)] = False
+
+    def play(
+        self, characters: Characters, clip_name: str, *, repetitions: float = 1, seconds: float | None = None
+    ) -> None:
+        """Play a clip over the pose, on the joints of its mask.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+        clip_name : str
+            A gesture of the motion library.
+        repetitions : float
+            Times that the clip is played, > 0; ``math.inf`` repeats a cyclic clip until `stop_play`.
+        seconds : float, optional
+            Length of the play, s; instead of `repetitions`.
+
+        Raises
+        ------
+        MotionError
+            No clip has this name.
+        """
+        rows = self._rows(characters)
+        model = self._simulation.model
+        clip = model.library.clip(clip_name)
+        if clip.kind is ClipKind.LOCOMOTION:
+            raise SettingsError(
+                describe("play", "locomotion examples are blended, not played", clip_name, "a gesture or idle clip")
+            )
+        length = clip.duration * repetitions if seconds is None else seconds
+        if not length > 0 or math.isnan(length):
+            raise SettingsError(describe("play", "length must be positive", length, "> 0 s"))
+        index = model.clip_table.names.index(clip_name)
+        self._simulation.animation.play(self._simulation.state, rows, index, length)
+
+    def stop_play(self, characters: Characters) -> None:
+        """Fade out what the characters play."""
+        self._simulation.animation.stop(self._simulation.state, self._rows(characters))
+
+    def _rows(self, characters: Characters) -> npt.NDArray[np.int32]:
+        capacity = self._simulation.state.capacity
+        if isinstance(characters, slice):
+            return np.arange(capacity, dtype=np.int32)[characters]
+        rows = np.atleast_1d(np.asarray(characters))
+        if rows.dtype == np.bool_:
+            rows = np.flatnonzero(rows)
+        if rows.size and (rows.min() < 0 or rows.max() >= capacity):
+            wrong = int(rows[(rows < 0) | (rows >= capacity)][0])
+            raise SettingsError(describe("characters", "no such row", wrong, f"0 to {capacity - 1}"))
+        return rows.astype(np.int32)
