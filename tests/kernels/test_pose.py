@@ -18,7 +18,7 @@ def random_rows(rng, count):
     for _ in range(count):
         q = rng.normal(0, 0.4, (JOINTS, 4)) + (1, 0, 0, 0)
         rows.append(oracle.quaternions_to_row(q / np.linalg.norm(q, axis=1, keepdims=True)))
-    return np.array(rows)
+    return np.array(rows, np.float32).reshape(count, 256)
 
 
 def make_blend(rng, count, samples=4):
