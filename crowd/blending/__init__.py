@@ -1,1 +1,1 @@
-"""TODO."""
+"""Parameter spaces: which examples to blend, with which weights."""
