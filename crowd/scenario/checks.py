@@ -131,7 +131,11 @@ def _check_individuals(scenario: Scenario, problems: Problems) -> None:
             list(people[index].position),
             f"at least the radius away, {radius[index]:g} m",
         )
+    reported: set[int] = set()
     for first, second in overlapping_pairs(position, radius, TOUCHING):
+        if int(second) in reported:
+            continue
+        reported.add(int(second))
         distance = float(np.hypot(*(position[first] - position[second])))
         problems.add(
             ("characters", int(second), "position"),

@@ -182,12 +182,26 @@ def _toml_problem(path: Path, message: str) -> str:
 
 
 def _shown(value: object) -> object:
+    """Form a value the way a TOML file writes it, short enough for one line."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
     if isinstance(value, Mapping):
         return "a table"
-    if isinstance(value, str | bool) or value is None:
-        return {True: "true", False: "false"}.get(value, value) if isinstance(value, bool) else value
-    text = str(list(value)) if isinstance(value, tuple) else str(value)
-    return text if len(text) <= SHOWN_INPUT else text[:SHOWN_INPUT] + "..."
+    if isinstance(value, int | float) or value is None:
+        return value
+    text = value if isinstance(value, str) else str(list(value) if isinstance(value, tuple) else value)
+    text = text if len(text) <= SHOWN_INPUT else text[:SHOWN_INPUT] + "..."
+    return text if isinstance(value, str) else _Verbatim(text)
+
+
+class _Verbatim:
+    """Text that is shown without quotes."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __str__(self) -> str:
+        return self._text
 
 
 def _add_problem(problems: Problems, details: ErrorDetails) -> None:

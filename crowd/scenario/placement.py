@@ -193,6 +193,7 @@ def place(scenario: Scenario, seed: int, characters: int | None = None) -> Place
     if characters is not None:
         scenario = scaled(scenario, characters)
     builder = _Builder(scenario, seed)
+    builder.take_circles()
     for index, person in enumerate(scenario.characters):
         builder.add_individual(index, person)
     for index, region in enumerate(scenario.regions):
@@ -215,6 +216,13 @@ def draw(spread: Spread, seed: int, key: int, purpose: int) -> float:
         if low <= value <= high:
             return value
     return min(max(spread.mean, low), high)
+
+
+def _places_on_circle(circle: Circle, count: int) -> list[Point]:
+    angle = 2.0 * math.pi * np.arange(count) / count
+    x = circle.center[0] + circle.radius * np.sin(angle)
+    z = circle.center[1] + circle.radius * np.cos(angle)
+    return list(zip(x.tolist(), z.tolist(), strict=True))
 
 
 @dataclass
@@ -270,6 +278,14 @@ class _Builder:
             )
         )
 
+    def take_circles(self) -> None:
+        """Reserve the places around circles, so that random starts keep clear of them."""
+        for index, region in enumerate(self.scenario.regions):
+            if region.circle is not None:
+                for number, point in enumerate(_places_on_circle(region.circle, region.count)):
+                    key = (index + 1) * PEOPLE_PER_TABLE + number
+                    self.starts.take(point, draw(region.radius, self.seed, key, PURPOSE_RADIUS))
+
     def add_region(self, index: int, region: Region) -> None:
         """Add the people of a region."""
         location: Location = ("regions", index)
@@ -277,10 +293,9 @@ class _Builder:
         keys = range(first_key, first_key + region.count)
         radius = [draw(region.radius, self.seed, key, PURPOSE_RADIUS) for key in keys]
         if region.circle is not None:
-            places = self._places_on_circle(region.circle, region.count)
+            places = _places_on_circle(region.circle, region.count)
             center = region.circle.center
             for place_index, (point, r) in enumerate(zip(places, radius, strict=True)):
-                self.starts.take(point, r)
                 self._check_start(location, place_index, point, r)
         else:
             assert region.area is not None
@@ -414,12 +429,6 @@ class _Builder:
         self.members.setdefault(f"{table}[{index}]", []).append(row)
         if person.goals.name is not None:
             self.members.setdefault(person.goals.name, []).append(row)
-
-    def _places_on_circle(self, circle: Circle, count: int) -> list[Point]:
-        angle = 2.0 * math.pi * np.arange(count) / count
-        x = circle.center[0] + circle.radius * np.sin(angle)
-        z = circle.center[1] + circle.radius * np.cos(angle)
-        return list(zip(x.tolist(), z.tolist(), strict=True))
 
     def _check_start(self, location: Location, number: int, point: Point, radius: float) -> None:
         if self.ground.clearance(np.array([point]))[0] < radius - 1e-3:
