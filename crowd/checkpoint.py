@@ -8,9 +8,9 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,13 @@ if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
 FORMAT = 1
+
+
+class Stateful(Protocol):
+    """A part of the simulation with arrays of its own that change in a run."""
+
+    def state_fields(self) -> Mapping[str, npt.NDArray[Any]]:
+        """Names and arrays; the arrays keep their identity over a run."""
 
 
 def state_arrays(simulation: Simulation) -> Iterator[tuple[str, npt.NDArray[Any]]]:
@@ -79,7 +86,9 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> None:
             facts = json.loads(str(stored["facts"]))
             contents = {name: stored[name] for name in stored.files if name != "facts"}
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise RecordingError(describe(str(path), "is not a checkpoint", str(error).splitlines()[0])) from error
+        raise RecordingError(
+            describe(str(path), "is not a checkpoint", str(error).splitlines()[0])
+        ) from error
     expected = {
         "format": FORMAT,
         "scenario": simulation.scenario.name,
@@ -95,7 +104,9 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> None:
     for name, array in state_arrays(simulation):
         stored_array = contents.get(name)
         if stored_array is None or stored_array.shape != array.shape:
-            raise RecordingError(describe(str(path), f"checkpoint lacks {name}", allowed=f"shape {array.shape}"))
+            raise RecordingError(
+                describe(str(path), f"checkpoint lacks {name}", allowed=f"shape {array.shape}")
+            )
         array[...] = stored_array
     simulation.step_index = int(facts["step_index"])
-    simulation.model.update_world(simulation.time)
+    simulation.model.timetable.update(simulation.model.world, simulation.time)

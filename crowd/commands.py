@@ -65,7 +65,9 @@ class Commands:
         rows = self._rows(characters)
         values = np.broadcast_to(np.asarray(parameters, dtype=np.float64), (rows.size, 3))
         if not np.isfinite(values).all():
-            raise SettingsError(describe("set_locomotion", "parameters must be finite", allowed="m/s, rad/s, m/s"))
+            raise SettingsError(
+                describe("set_locomotion", "parameters must be finite", allowed="m/s, rad/s, m/s")
+            )
         state = self._simulation.state
         state.is_directed[rows] = True
         state.directed_parameter[rows] = values
@@ -99,7 +101,9 @@ class Commands:
         clip = model.library.clip(clip_name)
         if clip.kind is ClipKind.LOCOMOTION:
             raise SettingsError(
-                describe("play", "locomotion examples are blended, not played", clip_name, "a gesture or idle clip")
+                describe(
+                    "play", "locomotion examples are blended, not played", clip_name, "a gesture or idle clip"
+                )
             )
         length = clip.duration * repetitions if seconds is None else seconds
         if not length > 0 or math.isnan(length):

@@ -46,6 +46,12 @@ class State:
 
     goal_index: IntArray = _array(dtype=np.int32)
     """Which goal of the character's list it walks to. (character,)"""
+    goal_world: FloatArray = _array(3)
+    """Point of the present goal, m. (character, 3)"""
+    goal_radius: FloatArray = _array()
+    """Distance at which the goal counts as reached, m. (character,)"""
+    visit_count: LongArray = _array(dtype=np.int64)
+    """Goals the character has been sent to; keys the points drawn in goal areas. (character,)"""
     wait_until: FloatArray = _array()
     """The character stands until this time, s. (character,)"""
     wants_to_walk: BoolArray = _array(dtype=np.bool_)
@@ -71,6 +77,8 @@ class State:
     """Commanded forward speed, turn rate, side speed, where `is_directed`; m/s, rad/s, m/s. (character, 3)"""
     locomotion_parameter: FloatArray = _array(3)
     """Forward speed, turn rate, side speed that locomotion realises now; m/s, rad/s, m/s. (character, 3)"""
+    library_parameter: FloatArray = _array(3)
+    """The same as the motion library knows it, for its own skeleton and tempo. (character, 3)"""
     is_moving: BoolArray = _array(dtype=np.bool_)
     """The locomotion layer is wanted: the character walks, turns, or is about to. (character,)"""
     locomotion_weight: FloatArray = _array()
@@ -126,7 +134,9 @@ class State:
         arrays = {}
         for declared in fields(cls):
             shape = (capacity, *declared.metadata["shape"])
-            arrays[declared.name] = np.full(shape, declared.metadata["fill"], dtype=declared.metadata["dtype"])
+            arrays[declared.name] = np.full(
+                shape, declared.metadata["fill"], dtype=declared.metadata["dtype"]
+            )
         return cls(**arrays)
 
     @property
@@ -140,7 +150,7 @@ class State:
             yield declared.name, getattr(self, declared.name)
 
     def clear(self, characters: IntArray) -> None:
-        """Set all values of these slots back to those of an empty slot; `spawn_count` is kept."""
+        """Set the values of these slots back to those of an empty slot; what keys random draws is kept."""
         for declared in fields(self):
-            if declared.name != "spawn_count":
+            if declared.name not in ("spawn_count", "visit_count"):
                 getattr(self, declared.name)[characters] = declared.metadata["fill"]

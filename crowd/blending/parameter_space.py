@@ -39,7 +39,9 @@ class ParameterSpace:
     arrays: SpaceArrays
 
     @classmethod
-    def build(cls, parameters: FloatArray, cycle_duration: FloatArray, names: Sequence[str]) -> "ParameterSpace":
+    def build(
+        cls, parameters: FloatArray, cycle_duration: FloatArray, names: Sequence[str]
+    ) -> "ParameterSpace":
         """Tessellate examples.
 
         Parameters
@@ -57,21 +59,27 @@ class ParameterSpace:
 
         Notes
         -----
-        Axes are divided by their range. Each of the four quadrants (turn left or right) x (side left or right)
-        is tessellated by itself, with the examples on its planes shared, so that no blend mixes turns or
-        sidesteps of opposite sides.
+        Axes are divided by their range. Each of the four quadrants (turn left or right) x (side left or
+        right) is tessellated by itself, with the examples on its planes shared, so that no blend mixes turns
+        or sidesteps of opposite sides.
         """
         parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         axis_range = np.ptp(parameters, axis=0)
         for axis, extent in zip(AXES, axis_range, strict=True):
             if not extent > 0:
                 raise MotionError(
-                    describe("locomotion examples", f"all have the same {axis}", allowed="examples on both sides of 0")
+                    describe(
+                        "locomotion examples",
+                        f"all have the same {axis}",
+                        allowed="examples on both sides of 0",
+                    )
                 )
         points = parameters / axis_range
         simplex = tessellate(points)
         if len(simplex) == 0:
-            raise MotionError(describe("locomotion examples", "do not span the parameter space", f"{len(points)} examples"))
+            raise MotionError(
+                describe("locomotion examples", "do not span the parameter space", f"{len(points)} examples")
+            )
         return cls(tuple(names), parameters, pack(points, axis_range, cycle_duration, simplex))
 
     @property
@@ -79,7 +87,9 @@ class ParameterSpace:
         """Number of tetrahedra."""
         return int(self.arrays.simplex.shape[0])
 
-    def locate(self, parameter: npt.ArrayLike) -> tuple[IntArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    def locate(
+        self, parameter: npt.ArrayLike
+    ) -> tuple[IntArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
         """Look up points.
 
         Parameters
@@ -141,7 +151,8 @@ def tessellate(points: FloatArray) -> IntArray:
     for turn_side in (1.0, -1.0):
         for step_side in (1.0, -1.0):
             members = np.flatnonzero(
-                (turn_side * points[:, 1] >= -PLANE_TOLERANCE) & (step_side * points[:, 2] >= -PLANE_TOLERANCE)
+                (turn_side * points[:, 1] >= -PLANE_TOLERANCE)
+                & (step_side * points[:, 2] >= -PLANE_TOLERANCE)
             )
             if len(members) < 4:
                 continue
@@ -164,7 +175,9 @@ def boundary_faces(simplex: IntArray) -> IntArray:
     return np.array([face for face, count in uses.items() if count == 1], dtype=np.int32)
 
 
-def pack(points: FloatArray, axis_range: FloatArray, cycle_duration: FloatArray, simplex: IntArray) -> SpaceArrays:
+def pack(
+    points: FloatArray, axis_range: FloatArray, cycle_duration: FloatArray, simplex: IntArray
+) -> SpaceArrays:
     """Prepare a tessellation for the look-up kernel."""
     corners = points[simplex]
     edges = np.transpose(corners[:, :3] - corners[:, 3:], (0, 2, 1))
@@ -201,7 +214,10 @@ def touches(
     inverse: FloatArray, corner: FloatArray, lowest: FloatArray, scale: FloatArray, cell: tuple[int, int, int]
 ) -> bool:
     """A tetrahedron may touch a grid cell: no face of it has the whole cell on its outer side."""
-    box = np.array(np.meshgrid(*[(index - 1e-3, index + 1 + 1e-3) for index in cell])).reshape(3, 8).T / scale + lowest
+    box = (
+        np.array(np.meshgrid(*[(index - 1e-3, index + 1 + 1e-3) for index in cell])).reshape(3, 8).T / scale
+        + lowest
+    )
     weights = (box - corner) @ inverse.reshape(3, 3).T
     all_weights = np.column_stack([weights, 1 - weights.sum(axis=1)])
     return bool((all_weights.max(axis=0) >= -1e-9).all())

@@ -7,7 +7,6 @@ import numpy as np
 
 from crowd.controllers.controller import IntArray, KeySamples, Step
 from crowd.state import State
-from crowd_kernels.clip import blend_samples
 from crowd_kernels.layers import play_crowd
 
 
@@ -37,8 +36,6 @@ class Animation:
     def __init__(self, capacity: int, settings: AnimationSettings | None = None) -> None:
         self.settings = settings or AnimationSettings()
         self._samples = KeySamples.create(capacity, 1)
-        self._layer_weight = np.zeros(capacity, np.float32)
-        self._mask_index = np.zeros(capacity, np.int32)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people without a play."""
@@ -78,8 +75,8 @@ class Animation:
         playing = step.active[state.play_clip[step.active] >= 0]
         if playing.size == 0:
             return
-        self._mask_index[playing] = table.mask_index[state.play_clip[playing]]
         samples = self._samples
+        samples.mask_index[playing] = table.mask_index[state.play_clip[playing]]
         play_crowd(
             table.first_key,
             table.key_count,
@@ -100,20 +97,6 @@ class Animation:
             samples.next_frame,
             samples.fraction,
             samples.weight,
-            self._layer_weight,
+            samples.layer_weight,
         )
-        blend_samples(
-            table.key_rotation,
-            table.key_pelvis,
-            playing,
-            samples.frame,
-            samples.next_frame,
-            samples.fraction,
-            samples.weight,
-            self._layer_weight,
-            self._mask_index,
-            table.joint_mask,
-            table.pelvis_mask,
-            state.pose_rotation,
-            state.pose_pelvis,
-        )
+        samples.blend_onto_pose(step, playing)

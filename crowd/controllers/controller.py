@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from crowd.model import Model
-from crowd.state import State
-
-IntArray = npt.NDArray[np.int32]
+from crowd.state import Float32Array, IntArray, State
+from crowd_kernels.clip import CHUNKS, ROW, blend_samples
 
 
 @dataclass
@@ -58,13 +56,44 @@ class KeySamples:
 
     frame: IntArray
     next_frame: IntArray
-    fraction: npt.NDArray[np.float32]
-    weight: npt.NDArray[np.float32]
+    fraction: Float32Array
+    weight: Float32Array
+    layer_weight: Float32Array
+    """Share of the layer in the pose. (character,)"""
+    mask_index: IntArray
+    """Joints that the layer writes, as a row of the clip table's masks. (character,)"""
+    scratch: Float32Array
 
     @classmethod
     def create(cls, capacity: int, count: int) -> "KeySamples":
         """Make room for `count` samples of `capacity` characters."""
         shape = (capacity, count)
         return cls(
-            np.zeros(shape, np.int32), np.zeros(shape, np.int32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+            np.zeros(shape, np.int32),
+            np.zeros(shape, np.int32),
+            np.zeros(shape, np.float32),
+            np.zeros(shape, np.float32),
+            np.ones(capacity, np.float32),
+            np.zeros(capacity, np.int32),
+            np.zeros((CHUNKS, ROW), np.float32),
+        )
+
+    def blend_onto_pose(self, step: Step, characters: IntArray) -> None:
+        """Blend the samples and mix the result onto the characters' pose."""
+        table, state = step.model.clip_table, step.state
+        blend_samples(
+            table.key_rotation,
+            table.key_pelvis,
+            characters,
+            self.frame,
+            self.next_frame,
+            self.fraction,
+            self.weight,
+            self.layer_weight,
+            self.mask_index,
+            table.joint_mask,
+            table.pelvis_mask,
+            state.pose_rotation,
+            state.pose_pelvis,
+            self.scratch,
         )

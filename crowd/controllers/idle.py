@@ -3,11 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from crowd.controllers.controller import IntArray, KeySamples, Step
 from crowd.state import State
-from crowd_kernels.clip import blend_samples
 from crowd_kernels.layers import idle_crowd
 
 
@@ -31,8 +28,6 @@ class Idle:
     def __init__(self, capacity: int, settings: IdleSettings | None = None) -> None:
         self.settings = settings or IdleSettings()
         self._samples = KeySamples.create(capacity, 2)
-        self._full_weight = np.ones(capacity, np.float32)
-        self._mask_index = np.zeros(capacity, np.int32)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people in the neutral variation, each at its own time of it."""
@@ -70,18 +65,4 @@ class Idle:
             samples.fraction,
             samples.weight,
         )
-        blend_samples(
-            table.key_rotation,
-            table.key_pelvis,
-            standing,
-            samples.frame,
-            samples.next_frame,
-            samples.fraction,
-            samples.weight,
-            self._full_weight,
-            self._mask_index,
-            table.joint_mask,
-            table.pelvis_mask,
-            state.pose_rotation,
-            state.pose_pelvis,
-        )
+        samples.blend_onto_pose(step, standing)

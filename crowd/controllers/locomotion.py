@@ -6,31 +6,34 @@ from typing import ClassVar
 import numpy as np
 
 from crowd.controllers.controller import IntArray, KeySamples, Step
-from crowd.state import FloatArray, State
+from crowd.state import State
 from crowd_kernels.barycentric import locate_crowd
-from crowd_kernels.clip import blend_samples
 from crowd_kernels.gait import contact_crowd, sample_crowd
 from crowd_kernels.locomotion import CommandLimits, GaitLimits, command_crowd, gait_crowd
+
+
+COMMAND_LIMITS = CommandLimits(
+    heading_time=0.35,
+    heading_speed=0.5,
+    turn_gain=2.6,
+    largest_turn_rate=2.5,
+    forward_acceleration=1.6,
+    braking=2.6,
+    side_acceleration=2.2,
+    turn_acceleration=8.0,
+)
+GAIT_LIMITS = GaitLimits(
+    start_speed=0.12, start_turn_rate=0.3, stop_speed=0.08, stop_turn_rate=0.12, ease_rate=14.0
+)
 
 
 @dataclass(frozen=True)
 class LocomotionSettings:
     """How people follow a desired velocity."""
 
-    command: CommandLimits = CommandLimits(
-        heading_time=0.35,
-        heading_speed=0.5,
-        turn_gain=2.6,
-        largest_turn_rate=2.5,
-        forward_acceleration=1.6,
-        braking=2.6,
-        side_acceleration=2.2,
-        turn_acceleration=8.0,
-    )
-    """Limits of a command and of its changes; larger accelerations follow avoidance closer but look hastier."""
-    gait: GaitLimits = GaitLimits(
-        start_speed=0.12, start_turn_rate=0.3, stop_speed=0.08, stop_turn_rate=0.12, ease_rate=14.0
-    )
+    command: CommandLimits = COMMAND_LIMITS
+    """Limits of a command and of its changes; larger accelerations avoid more closely but look hastier."""
+    gait: GaitLimits = GAIT_LIMITS
     """When people start and stop moving."""
 
 
@@ -57,8 +60,6 @@ class Locomotion:
         self._library_parameter = np.zeros((capacity, 3))
         self._is_inside = np.zeros(capacity, np.uint8)
         self._samples = KeySamples.create(capacity, 4)
-        self._layer_weight = np.zeros(capacity, np.float32)
-        self._mask_index = np.zeros(capacity, np.int32)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people standing, each with its own gait phase."""
@@ -66,7 +67,7 @@ class Locomotion:
         state.locomotion_weight[characters] = 0.0
         state.is_moving[characters] = False
 
-    def command(self, step: Step, out_library_parameter: FloatArray) -> None:
+    def command(self, step: Step) -> None:
         """Turn desired velocities into parameters inside the hull, and advance gait state and phase."""
         state, people = step.state, step.model.people
         command_crowd(
@@ -95,7 +96,7 @@ class Locomotion:
             state.example,
             state.example_weight,
             state.cycle_rate,
-            out_library_parameter,
+            state.library_parameter,
             self._is_inside,
         )
         gait_crowd(
@@ -119,8 +120,8 @@ class Locomotion:
         moving = step.active[state.locomotion_weight[step.active] > 0.0]
         if moving.size == 0:
             return
-        np.copyto(self._layer_weight, state.locomotion_weight, casting="same_kind")
         samples = self._samples
+        np.copyto(samples.layer_weight, state.locomotion_weight, casting="same_kind")
         sample_crowd(
             table.example_clip,
             table.first_key,
@@ -134,22 +135,13 @@ class Locomotion:
             samples.fraction,
             samples.weight,
         )
-        blend_samples(
-            table.key_rotation,
-            table.key_pelvis,
-            moving,
-            samples.frame,
-            samples.next_frame,
-            samples.fraction,
-            samples.weight,
-            self._layer_weight,
-            self._mask_index,
-            table.joint_mask,
-            table.pelvis_mask,
-            state.pose_rotation,
-            state.pose_pelvis,
-        )
+        samples.blend_onto_pose(step, moving)
         stepping = moving[state.locomotion_weight[moving] > 0.5]
         contact_crowd(
-            state.example, state.example_weight, state.phase, table.contact_phase, stepping, self.contact_wanted
+            table.contact_phase,
+            state.example,
+            state.example_weight,
+            state.phase,
+            stepping,
+            self.contact_wanted,
         )

@@ -72,7 +72,8 @@ class Clip:
         Times in s with their events, in ascending order. A cyclic clip starts with RHS at time 0; its events
         lie in [0, duration).
     parameters : tuple of float
-        Net forward speed m/s, turn rate rad/s (left positive), side speed m/s (left positive) over whole cycles.
+        Net forward speed m/s, turn rate rad/s (left positive), side speed m/s (left positive) over whole
+        cycles.
     cycles : int
         Gait cycles in the clip: 2 for locomotion, 0 elsewhere.
     mask : JointMask

@@ -41,7 +41,18 @@ class SpaceArrays(NamedTuple):
 
 @kernel
 def nearest_on_triangle(
-    px: float, py: float, pz: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float, cx: float, cy: float, cz: float
+    px: float,
+    py: float,
+    pz: float,
+    ax: float,
+    ay: float,
+    az: float,
+    bx: float,
+    by: float,
+    bz: float,
+    cx: float,
+    cy: float,
+    cz: float,
 ) -> tuple[float, float, float]:
     """Find the barycentric weights of the point of triangle a, b, c nearest to p.
 
@@ -95,7 +106,9 @@ def nearest_on_triangle(
 
 
 @kernel
-def simplex_weights(space: SpaceArrays, simplex: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+def simplex_weights(
+    space: SpaceArrays, simplex: int, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
     """Find the barycentric weights of a point in one tetrahedron; they sum to 1 and may be negative."""
     last = space.simplex[simplex, 3]
     dx = x - space.example[last, 0]
@@ -113,7 +126,14 @@ def find_simplex(space: SpaceArrays, x: float, y: float, z: float) -> int:
     i = math.floor((x - space.grid_origin[0]) * space.grid_scale[0])
     j = math.floor((y - space.grid_origin[1]) * space.grid_scale[1])
     k = math.floor((z - space.grid_origin[2]) * space.grid_scale[2])
-    if i < 0 or j < 0 or k < 0 or i >= space.grid_shape[0] or j >= space.grid_shape[1] or k >= space.grid_shape[2]:
+    if (
+        i < 0
+        or j < 0
+        or k < 0
+        or i >= space.grid_shape[0]
+        or j >= space.grid_shape[1]
+        or k >= space.grid_shape[2]
+    ):
         return -1
     cell = (int(i) * space.grid_shape[1] + int(j)) * space.grid_shape[2] + int(k)
     best = -1

@@ -13,7 +13,9 @@ PURPOSE_IDLE_DWELL = 102
 
 
 @kernel
-def key_at(time: float, first_key: int, key_count: int, key_rate: float, is_cyclic: bool) -> tuple[int, int, float]:
+def key_at(
+    time: float, first_key: int, key_count: int, key_rate: float, is_cyclic: bool
+) -> tuple[int, int, float]:
     """Find the two key frames around a time and the fraction between them.
 
     Parameters

@@ -336,7 +336,13 @@ def command_crowd(
                 side = directed_parameter[character, 2]
             elif wants_to_walk[character]:
                 turn = wanted_turn_rate(
-                    character, yaw, heading_velocity_world, position_world, way_point_world, turning_side, limits
+                    character,
+                    yaw,
+                    heading_velocity_world,
+                    position_world,
+                    way_point_world,
+                    turning_side,
+                    limits,
                 )
             out_wanted_parameter[character, 0] = forward
             out_wanted_parameter[character, 1] = turn

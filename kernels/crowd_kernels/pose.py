@@ -14,7 +14,15 @@ TWO = np.float32(2.0)
 
 @kernel
 def child_row(
-    parent_rotation: Any, parent_position: Any, local: Any, scale: Any, x: Any, y: Any, z: Any, out_rotation: Any, out_position: Any
+    parent_rotation: Any,
+    parent_position: Any,
+    local: Any,
+    scale: Any,
+    x: Any,
+    y: Any,
+    z: Any,
+    out_rotation: Any,
+    out_position: Any,
 ) -> None:
     """Place one joint below its parent for 16 characters; flat float32 rows, components outermost.
 
@@ -100,9 +108,13 @@ def kinematics_chunk(
             character = active[first + lane]
             for joint in range(joint_count):
                 for component in range(3):
-                    out_joint_position_model[character, joint, component] = position[joint * 48 + component * LANES + lane]
+                    out_joint_position_model[character, joint, component] = position[
+                        joint * 48 + component * LANES + lane
+                    ]
                 for component in range(4):
-                    out_joint_rotation_model[character, joint, component] = rotation[joint * 64 + component * LANES + lane]
+                    out_joint_rotation_model[character, joint, component] = rotation[
+                        joint * 64 + component * LANES + lane
+                    ]
 
 
 @parallel_kernel

@@ -81,7 +81,12 @@ def nlerp(a: Quaternion, b: Quaternion, weight: float) -> Quaternion:
     other = weight if dot >= 0.0 else -weight
     own = 1.0 - weight
     return normalized(
-        (own * a[0] + other * b[0], own * a[1] + other * b[1], own * a[2] + other * b[2], own * a[3] + other * b[3])
+        (
+            own * a[0] + other * b[0],
+            own * a[1] + other * b[1],
+            own * a[2] + other * b[2],
+            own * a[3] + other * b[3],
+        )
     )
 
 

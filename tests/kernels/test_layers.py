@@ -74,7 +74,9 @@ def test_idle_variations_pass_over_without_a_jump():
 def test_idle_choices_depend_on_the_seed_only():
     np.testing.assert_array_equal(run_idle(seconds=20), run_idle(seconds=20))
     assert (run_idle(seconds=20) != run_idle(seconds=20, seed=4)).any()
-    np.testing.assert_array_equal(run_idle(people=50, seconds=8)[:, :1], run_idle(people=50, seconds=8)[:, :1])
+    np.testing.assert_array_equal(
+        run_idle(people=50, seconds=8)[:, :1], run_idle(people=50, seconds=8)[:, :1]
+    )
 
 
 def test_a_play_eases_in_and_out_and_hands_over_to_the_queued_one():

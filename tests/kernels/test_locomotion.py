@@ -140,12 +140,16 @@ def test_nobody_wavers_with_the_way_straight_behind():
             locomotion_parameter=parameter,
             out_library_parameter=library,
         )
-        integrate_root_crowd(library, np.ones(count), np.ones(count), everyone(count), DT, position, yaw, parameter)
+        integrate_root_crowd(
+            library, np.ones(count), np.ones(count), everyone(count), DT, position, yaw, parameter
+        )
         sides.append(np.sign(parameter[:, 1]))
     first = sides[0]
     error = np.abs(np.angle(np.exp(1j * (np.arctan2(back[:, 0], back[:, 2]) - yaw))))
     assert (error < 0.15).all(), "everyone has turned round after two seconds"
-    assert all((turn[np.abs(parameter[:, 1]) > 0.5] == first[np.abs(parameter[:, 1]) > 0.5]).all() for turn in sides)
+    assert all(
+        (turn[np.abs(parameter[:, 1]) > 0.5] == first[np.abs(parameter[:, 1]) > 0.5]).all() for turn in sides
+    )
 
 
 @given(
@@ -157,7 +161,9 @@ def test_nobody_wavers_with_the_way_straight_behind():
 @settings(max_examples=25, deadline=None)
 def test_ease_is_the_critically_damped_spring(value, rate, goal, stiffness):
     np.testing.assert_allclose(
-        ease(value, rate, goal, stiffness, DT), oracle.spring(value, rate, goal, stiffness, DT, 400), atol=1e-5
+        ease(value, rate, goal, stiffness, DT),
+        oracle.spring(value, rate, goal, stiffness, DT, 400),
+        atol=1e-5,
     )
 
 
@@ -209,13 +215,25 @@ def run_gait(wanted, seconds, present=None, phase=0.3, weight=0.0):
     history = []
     for _ in range(round(seconds / DT)):
         gait_crowd(
-            wanted, present, np.array([0.9]), np.ones(1), everyone(1), GAIT, DT, is_moving, weights, rates, phases
+            wanted,
+            present,
+            np.array([0.9]),
+            np.ones(1),
+            everyone(1),
+            GAIT,
+            DT,
+            is_moving,
+            weights,
+            rates,
+            phases,
         )
         history.append((weights[0], phases[0], bool(is_moving[0])))
     return history
 
 
-@pytest.mark.parametrize(("wanted", "first"), [((0.5, 0.6, 0), 0.04), ((0.5, -0.6, 0), 0.54), ((0, 0, 0.4), 0.04)])
+@pytest.mark.parametrize(
+    ("wanted", "first"), [((0.5, 0.6, 0), 0.04), ((0.5, -0.6, 0), 0.54), ((0, 0, 0.4), 0.04)]
+)
 def test_a_start_lifts_the_foot_on_the_side_of_the_turn(wanted, first):
     history = run_gait(wanted, 1.0)
     assert history[0][1] == pytest.approx(first + 0.9 * DT)

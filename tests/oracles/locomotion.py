@@ -73,4 +73,6 @@ def integrate_root(position, yaw, parameter, dt, parts=2000):
     for part in range(parts):
         facing = cmath.exp(1j * (yaw + (part + 0.5) * h * parameter[1]))
         here += h * facing * complex(parameter[0], parameter[2])
-    return np.array([here.imag, position[1], here.real]), cmath.phase(cmath.exp(1j * (yaw + parameter[1] * dt)))
+    return np.array([here.imag, position[1], here.real]), cmath.phase(
+        cmath.exp(1j * (yaw + parameter[1] * dt))
+    )

@@ -47,6 +47,8 @@ def kinematics(parent, offset, segment, leg_segment, segment_scale, rotation_loc
     positions = [np.asarray(pelvis, float) * segment_scale[leg_segment]]
     for joint in range(1, len(parent)):
         above = parent[joint]
-        positions.append(positions[above] + rotations[above] @ (offset[joint] * segment_scale[segment[joint]]))
+        positions.append(
+            positions[above] + rotations[above] @ (offset[joint] * segment_scale[segment[joint]])
+        )
         rotations.append(rotations[above] @ matrix(rotation_local[joint]))
     return np.array(positions), np.array(rotations)

@@ -1,0 +1,119 @@
+"""Where to and how fast: way points, preferred velocity, avoidance, and bodies kept apart."""
+
+from typing import Any
+
+import numpy as np
+
+
+from crowd.controllers.controller import Step
+from crowd.model import Model
+from crowd.navigation.avoidance import Avoidance, AvoidanceSettings
+from crowd.navigation.patience import Patience
+from crowd.navigation.routing import Routing
+
+from crowd_kernels.locomotion import prefer_crowd
+
+BRAKING_TIME = 0.8
+"""Remaining distance over speed from which on people slow down before a goal at which they stay, s."""
+FULL_SPEED_ANGLE = 0.7
+"""A way this far to the side is walked at full speed, rad."""
+NO_SPEED_ANGLE = 1.9
+"""With the way farther behind than this, people turn before they walk, rad."""
+HASTE = 1.2
+"""Largest speed over the wanted one, so that people can hurry out of somebody's way."""
+STANDING_RESPONSIBILITY = 0.1
+"""Share of an avoidance that people who stand take on; those who walk take the rest."""
+SHORTEST_MAXIMUM_SPEED = 0.6
+"""Speed with which even people who stand can step aside, m/s."""
+
+
+class Navigator:
+    """The navigate and steer stages of a frame, and the projection of overlaps."""
+
+    def __init__(self, model: Model, settings: AvoidanceSettings) -> None:
+        capacity = model.capacity
+        self.model = model
+        self.routing = Routing(model.world, capacity)
+        self.avoidance = Avoidance(settings, capacity)
+        self.patience = Patience(capacity)
+        self._responsibility = np.full(capacity, 0.5)
+        self._stays_at_goal = ~model.placed.leaves_at_goal
+        self._mobility = np.ones(capacity)
+        self._maximum_speed = np.zeros(capacity)
+        self._wanted_speed = np.zeros(capacity)
+
+    def parts(self) -> tuple[tuple[str, Any], ...]:
+        """Parts that keep state between steps, with names."""
+        return (("routing", self.routing), ("patience", self.patience))
+
+    def navigate(self, step: Step) -> None:
+        """Find the next way point of everyone who walks."""
+        state = step.state
+        walking = step.active[state.wants_to_walk[step.active]]
+        self.routing.way_points(
+            state.position_world,
+            self.model.people.radius,
+            walking,
+            step.index,
+            state.way_point_world,
+            state.remaining_distance,
+        )
+
+    def steer(self, step: Step) -> None:
+        """Choose the velocity nearest to the preferred one that avoids others and walls."""
+        state = step.state
+        np.multiply(state.wanted_speed, state.wants_to_walk, out=self._wanted_speed)
+        prefer_crowd(
+            state.position_world,
+            state.yaw,
+            state.way_point_world,
+            state.remaining_distance,
+            self._wanted_speed,
+            self._stays_at_goal,
+            step.active,
+            BRAKING_TIME,
+            FULL_SPEED_ANGLE,
+            NO_SPEED_ANGLE,
+            state.preferred_velocity_world,
+        )
+        self._responsibility[:] = np.where(state.wants_to_walk, 0.5, STANDING_RESPONSIBILITY)
+        np.maximum(HASTE * self._wanted_speed, SHORTEST_MAXIMUM_SPEED, out=self._maximum_speed)
+        self.avoidance.steer(
+            state.position_world,
+            state.velocity_world,
+            state.preferred_velocity_world,
+            self.model.people.radius,
+            self._maximum_speed,
+            self._responsibility,
+            step.active,
+            self.model.world.walls,
+            step.dt,
+            state.desired_velocity_world,
+        )
+
+    def move_discs(self, step: Step) -> None:
+        """Move plain discs by their desired velocity, instead of whole people by their animation."""
+        state, rows = step.state, step.active
+        state.previous_position_world[rows] = state.position_world[rows]
+        state.position_world[rows] += step.dt * state.desired_velocity_world[rows]
+        velocity = state.desired_velocity_world[rows]
+        is_going = np.hypot(velocity[:, 0], velocity[:, 2]) > 1e-3
+        heading = np.arctan2(velocity[:, 0], velocity[:, 2])
+        state.yaw[rows] = np.where(is_going, heading, state.yaw[rows])
+
+    def project(self, step: Step) -> None:
+        """Push overlapping bodies apart and out of walls; the realised velocity includes the push."""
+        state = step.state
+        self.avoidance.project(
+            state.position_world,
+            state.previous_position_world,
+            self.model.people.radius,
+            self._mobility,
+            step.active,
+            self.model.world.walls,
+            step.dt,
+        )
+        moved = state.position_world[step.active] - state.previous_position_world[step.active]
+        state.velocity_world[step.active] = moved / step.dt
+
+

@@ -1,0 +1,65 @@
+"""People: what stays the same about each slot's person during a run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.motion.body import draw_segment_scale
+from crowd.motion.skeleton import Segment, Skeleton
+from crowd_kernels.random import uniform
+
+FloatArray = npt.NDArray[np.float64]
+
+PURPOSE_TEMPO = 201
+
+
+@dataclass(frozen=True)
+class People:
+    """Arrays with one row for each slot.
+
+    Attributes
+    ----------
+    radius : (N,) float64
+        Body disc, m.
+    preferred_speed : (N,) float64
+        Speed on a free way, m/s.
+    stature : (N,) float64
+        Height, m.
+    segment_scale : (N, 8) float32
+        Scale of joint offsets by `Segment`.
+    stride_scale : (N,) float64
+        Leg length over that of the library's skeleton.
+    tempo : (N,) float64
+        Cadence over that of the library: dynamic similarity of longer legs, and a personal share.
+    """
+
+    radius: FloatArray
+    preferred_speed: FloatArray
+    stature: FloatArray
+    segment_scale: npt.NDArray[np.float32]
+    stride_scale: FloatArray
+    tempo: FloatArray
+
+    @classmethod
+    def build(
+        cls,
+        skeleton: Skeleton,
+        radius: FloatArray,
+        preferred_speed: FloatArray,
+        stature: FloatArray,
+        seed: int,
+    ) -> "People":
+        """Draw proportions and tempo for people of given stature.
+
+        Notes
+        -----
+        Cadence scales by one over the square root of leg length (dynamic similarity, Alexander 1984); a person
+        keeps a personal tempo within 3 %.
+        """
+        count = radius.shape[0]
+        segment_scale = draw_segment_scale(skeleton, stature, seed)
+        stride_scale = segment_scale[:, Segment.LEG].astype(np.float64)
+        personal = np.array([uniform(seed, character, 0, PURPOSE_TEMPO) for character in range(count)])
+        tempo = (0.97 + 0.06 * personal) / np.sqrt(stride_scale)
+        return cls(radius, preferred_speed, stature, segment_scale, stride_scale, tempo)

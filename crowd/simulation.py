@@ -1,0 +1,269 @@
+"""The simulation: a run is a pure function of scenario, seed and commands."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from crowd import checkpoint
+from crowd.checkpoint import Stateful
+from crowd.commands import Commands
+from crowd.controllers.animation import Animation
+from crowd.controllers.controller import Controller, IntArray, Step
+from crowd.controllers.foot_lock import FootLock
+from crowd.controllers.idle import Idle
+from crowd.controllers.locomotion import Locomotion
+from crowd.controllers.world_offset import WorldOffset
+from crowd.errors import SettingsError, describe
+from crowd.joints import Joints
+from crowd.metrics import Metrics
+from crowd.model import Model
+from crowd.motion.library import MotionLibrary
+from crowd.navigation.navigator import Navigator, avoidance_settings
+from crowd.population import Population
+from crowd.scenario import Scenario
+from crowd.state import Float32Array, FloatArray, State
+from crowd_kernels import _jit
+
+SERIAL_BELOW = 200
+STAGES = ("perceive", "decide", "navigate", "steer", "locomote", "animate", "settle", "record")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What `Simulation.step` returns.
+
+    Attributes
+    ----------
+    index : int
+        Number of the step, from 0.
+    time : float
+        Simulation time at the end of the step, s.
+    simulation : Simulation
+    """
+
+    index: int
+    time: float
+    simulation: Simulation
+
+
+class Simulation:
+    """A crowd in a world, stepped at a fixed rate.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What `crowd.load_scenario` returns.
+    seed : int
+        Key of every random choice; the same seed gives the same bits on any number of threads.
+    threads : int, optional
+        Threads of the kernels; all cores when left out. Fewer than 200 characters always run on one.
+    motions : MotionLibrary, optional
+        The built-in library when left out.
+    characters : int, optional
+        Number of people, instead of the scenario's own.
+    bodies : {"people", "discs"}
+        ``"discs"`` moves plain discs by avoidance alone, without animation: the comparison for benchmarks.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        seed: int = 0,
+        threads: int | None = None,
+        motions: MotionLibrary | None = None,
+        characters: int | None = None,
+        bodies: Literal["people", "discs"] = "people",
+    ) -> None:
+        self.scenario = scenario
+        self.seed = seed
+        self.bodies = bodies
+        self.dt = scenario.dt
+        self.step_index = 0
+        self.model = Model.build(scenario, seed, motions, characters)
+        capacity = self.model.capacity
+        self.threads = 1 if capacity < SERIAL_BELOW else thread_count(threads)
+        _jit.set_thread_count(self.threads)
+        self.state = State.create(capacity)
+        self.model.timetable.update(self.model.world, 0.0)
+        self.navigator = Navigator(self.model, avoidance_settings(scenario))
+        self.population = Population(self.model, seed, self.navigator.routing)
+        self.world_offset = WorldOffset(capacity)
+        self.idle = Idle(capacity)
+        self.locomotion = Locomotion(capacity)
+        self.animation = Animation(capacity)
+        self.controllers: tuple[Controller, ...] = (
+            self.world_offset,
+            self.idle,
+            self.locomotion,
+            self.animation,
+        )
+        self.foot_lock = FootLock(self.model.skeleton, capacity=capacity, dt=self.dt)
+        self.joints = Joints(self.model.skeleton, capacity)
+        self.commands = Commands(self)
+        self.metrics = Metrics()
+        self.stage_seconds = dict.fromkeys(STAGES, 0.0)
+        self.compile_seconds = 0.0
+        first = self.population.first_people()
+        self.population.enter(
+            self.state, first, self.model.placed.position_world[first], self.model.placed.yaw[first]
+        )
+        self._prepare(first)
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.step_index * self.dt
+
+    @property
+    def is_finished(self) -> bool:
+        """Everyone has completed the task list, and nobody is still to come."""
+        present = self.state.is_active
+        return not self.population.expects_more() and bool(self.state.is_finished[present].all())
+
+    def step(self) -> Frame:
+        """Advance by one step of `dt`."""
+        _jit.set_thread_count(self.threads)
+        step = Step(
+            self.model,
+            self.state,
+            self.population.active(self.state),
+            self.step_index,
+            self.time + self.dt,
+            self.dt,
+            self.seed,
+        )
+        frame = Frame(step.index, step.time, self)
+        for stage in STAGES:
+            start = time.perf_counter()
+            getattr(self, f"_{stage}")(step, frame)
+            self.stage_seconds[stage] += time.perf_counter() - start
+        self.step_index += 1
+        return frame
+
+    def run(self, seconds: float | None = None) -> Iterator[Frame]:
+        """Step for `seconds` of simulated time; without it, until everyone has finished."""
+        last = None if seconds is None else self.step_index + round(seconds / self.dt)
+        while not self.is_finished if last is None else self.step_index < last:
+            yield self.step()
+
+    # ---- the stages of a frame, in the order of `STAGES`
+
+    def _perceive(self, step: Step, frame: Frame) -> None:
+        """Let people in, change the world by its timetable."""
+        self.model.timetable.update(self.model.world, step.time)
+        self._prepare(self.population.newcomers(step))
+        step.active = self.population.active(self.state)
+
+    def _decide(self, step: Step, frame: Frame) -> None:
+        """Advance goal lists; start what the scenario plays."""
+        self.population.decide(step, self.commands)
+        step.active = self.population.active(self.state)
+
+    def _navigate(self, step: Step, frame: Frame) -> None:
+        """Find way points."""
+        self.navigator.navigate(step)
+
+    def _steer(self, step: Step, frame: Frame) -> None:
+        """Choose velocities that avoid others and walls."""
+        self.navigator.steer(step)
+
+    def _locomote(self, step: Step, frame: Frame) -> None:
+        """Turn velocities into parameters of the motion library."""
+        if self.bodies == "people":
+            self.locomotion.command(step)
+
+    def _animate(self, step: Step, frame: Frame) -> None:
+        """Run the controller stack."""
+        if self.bodies == "discs":
+            self.navigator.move_discs(step)
+            return
+        for controller in self.controllers:
+            controller.evaluate(step)
+
+    def _settle(self, step: Step, frame: Frame) -> None:
+        """Push bodies apart, plant feet, and compute joints."""
+        self.navigator.project(step)
+        if self.bodies == "discs":
+            return
+        state, model = self.state, self.model
+        self.foot_lock.evaluate(
+            state.pose_rotation,
+            state.pose_pelvis,
+            model.people.segment_scale,
+            state.position_world,
+            state.yaw,
+            self.locomotion.contact_wanted,
+            step.active,
+            step.dt,
+            state.foot_point_world,
+            state.foot_contact,
+        )
+        self.joints.compute(state, model.people, step.active)
+
+    def _record(self, step: Step, frame: Frame) -> None:
+        """Hand the frame to metrics."""
+        self.metrics.observe(self)
+
+    # ---- what a program reads
+
+    def joint_positions_world(self) -> FloatArray:
+        """Joints of everyone in world space, m. (N, J, 3) float64; rows of empty slots mean nothing."""
+        return self.joints.positions_world(self.state)
+
+    def joint_rotations_local(self) -> Float32Array:
+        """Rotations against the parent joints, unit quaternions. (N, J, 4) float32."""
+        rows = self.state.pose_rotation.reshape(self.state.capacity, 4, -1)
+        return np.ascontiguousarray(rows[:, :, : self.model.skeleton.joint_count].transpose(0, 2, 1))
+
+    def pelvis_positions_root(self) -> Float32Array:
+        """Pelvis in the root frame, in each person's own scale, m. (N, 3) float32."""
+        return self.joints.position_model[:, 0].copy()
+
+    # ---- stop and go on
+
+    def stateful_parts(self) -> tuple[tuple[str, Stateful], ...]:
+        """Parts with arrays of their own that change in a run."""
+        return (
+            ("population", self.population),
+            ("foot_lock", self.foot_lock),
+            *self.navigator.parts(),
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the whole state to a file, see `crowd.checkpoint.save`."""
+        checkpoint.save(self, path)
+
+    def restore(self, path: str | os.PathLike[str]) -> None:
+        """Continue from a saved state of the same scenario, number of people and seed, with the same bits."""
+        checkpoint.restore(self, path)
+
+    def _prepare(self, rows: IntArray) -> None:
+        """Prepare layers for people who have just entered."""
+        if rows.size == 0:
+            return
+        for controller in self.controllers:
+            controller.activate(self.state, rows)
+        self.foot_lock.reset(rows)
+
+
+def thread_count(wanted: int | None) -> int:
+    """Threads to use: all that there are, or those wanted.
+
+    Raises
+    ------
+    SettingsError
+        There are not so many.
+    """
+    most = _jit.maximum_thread_count()
+    if wanted is None:
+        return most
+    if not 1 <= wanted <= most:
+        raise SettingsError(describe("threads", "is out of range", wanted, f"1 to {most}"))
+    return wanted
