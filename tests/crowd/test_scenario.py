@@ -110,7 +110,8 @@ def test_a_valid_file_is_read_with_defaults(tmp_path: Path) -> None:
         (
             "x = [2.0, 4.0]",
             "x = [4.0, 2.0]",
-            "scene.toml: line 5: world.boxes[0].x: must rise; got [4.0, 2.0]; allowed [low, high] with low < high",
+            "scene.toml: line 5: world.boxes[0].x: must rise; got [4.0, 2.0]; "
+            "allowed [low, high] with low < high",
         ),
         (
             'name = "anna"',
@@ -121,7 +122,7 @@ def test_a_valid_file_is_read_with_defaults(tmp_path: Path) -> None:
         (
             "[world]",
             "[expect]\n'overlap.max_deth_m' = { max = 0.05 }\n[world]",
-            'scene.toml: line 4: expect."overlap.max_deth_m": unknown metric; allowed "overlap.max_depth_m", ',
+            'scene.toml: line 4: expect."overlap.max_deth_m": unknown metric; allowed "overlap.max_depth_m"',
         ),
         (
             "[world]",

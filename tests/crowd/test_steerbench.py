@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -157,8 +158,11 @@ def test_an_idle_agent_waits_where_it_is(tmp_path: Path) -> None:
             agent(vector("position", 0, 0), "<seekTarget/>"),
             'case.xml: line 6: seekTarget: unknown goal; got \'seekTarget\'; allowed "seekStaticTarget", ',
         ),
-        ("<circleObstacle/>", "case.xml: line 6: circleObstacle: unknown element; got 'circleObstacle'; allowed "),
-        (box("obstacle", (1, -1), (0, 1)), "case.xml: line 6: obstacle: xmin must be below xmax; got '1 and -1'"),
+        ("<circleObstacle/>", "case.xml: line 6: circleObstacle: unknown element; got 'circleObstacle'; "),
+        (
+            box("obstacle", (1, -1), (0, 1)),
+            "case.xml: line 6: obstacle: xmin must be below xmax; got '1 and -1'",
+        ),
         (
             agent(vector("position", 0, 0), seek(1, 1)).replace("0.5", "-0.5"),
             "case.xml: line 6: radius: is out of range; got -0.5; allowed > 0",
@@ -172,7 +176,9 @@ def test_an_idle_agent_waits_where_it_is(tmp_path: Path) -> None:
             "case.xml: line 7: characters[0].goals[0].position: goal is inside a wall; got [1.0, 1.0]; ",
         ),
         (
-            agent(vector("position", 0, 0), seek(5, 5)) + "\n" + agent(vector("position", 0.4, 0), seek(5, 5)),
+            agent(vector("position", 0, 0), seek(5, 5))
+            + "\n"
+            + agent(vector("position", 0.4, 0), seek(5, 5)),
             "case.xml: line 7: characters[1].position: start overlaps characters[0], 0.4 m away; ",
         ),
         ("", "case.xml: line 2: SteerBenchTestCase: has no agents; "),
@@ -244,7 +250,7 @@ def test_ideal_times_equal_the_published_ones(shared_data: Path, name: str) -> N
     times = []
     for person in scenario.characters:
         path = [person.position, *(goal.position for goal in person.goals if goal.position is not None)]
-        times.append(sum(length_between(a, b) for a, b in zip(path, path[1:], strict=False)) / person.speed)
+        times.append(sum(length_between(a, b) for a, b in pairwise(path)) / person.speed)
     assert np.mean(times) == pytest.approx(IDEAL_TIMES[name], abs=0.006)
 
 
