@@ -1,6 +1,8 @@
 """Exact geometry of a scenario's ground: what is free at the start, before any grid is laid over it."""
 
+import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -9,7 +11,7 @@ from shapely.geometry import LineString, box
 from shapely.geometry import Polygon as ShapelyPolygon
 from shapely.geometry.base import BaseGeometry
 
-from crowd.scenario.schema import Area, TimedObstacle, WorldTable
+from crowd.scenario.schema import Area, Point, TimedObstacle, WorldTable
 from crowd.scenario.source import Location
 
 FloatArray = npt.NDArray[np.float64]
@@ -121,3 +123,25 @@ def overlapping_pairs(position: FloatArray, radius: FloatArray, tolerance: float
     gap = np.hypot(*(position[asked] - position[found]).T) - radius[asked] - radius[found]
     pairs = np.stack([asked, found], axis=1)[gap < -tolerance]
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], np.intp)
+
+
+def wall_segments(world: WorldTable) -> dict[str, FloatArray]:
+    """Edges of all obstacles as line segments, with the times at which they are there.
+
+    Returns
+    -------
+    dict
+        ``wall`` (W, 2, 3): both ends, m; ``appear_at`` (W,) and ``disappear_at`` (W,): s, infinite for ever.
+    """
+    ends: list[tuple[Point, Point]] = []
+    times: list[tuple[float, float]] = []
+    for _, item, shape in obstacles(world):
+        line = shape.exterior if isinstance(shape, ShapelyPolygon) else shape
+        points = list(line.coords)
+        ends.extend(pairwise(points))
+        last = math.inf if item.disappear_at is None else item.disappear_at
+        times.extend([(item.appear_at, last)] * (len(points) - 1))
+    wall = np.zeros((len(ends), 2, 3))
+    wall[:, :, [0, 2]] = np.array(ends, np.float64).reshape(-1, 2, 2)
+    appear_at, disappear_at = np.array(times, np.float64).reshape(-1, 2).T.copy()
+    return {"wall": wall, "appear_at": appear_at, "disappear_at": disappear_at}
