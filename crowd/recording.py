@@ -162,6 +162,7 @@ class Recorder:
         if self._file is None:
             return
         self._write()
+        os.ftruncate(self._descriptor, self._file.id.get_filesize())
         file, self._file = self._file, None
         try:
             file.close()

@@ -93,6 +93,7 @@ def test_every_field_is_read_back(tmp_path: Path) -> None:
                     kept[name].append(getattr(run.state, name).copy())
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.frame_count == 75
+        assert recording.path.stat().st_size < 200_000
         assert np.allclose(recording.time, np.arange(1, 76) / 30)
         for name, values in kept.items():
             read = recording.read(name)
