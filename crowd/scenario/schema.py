@@ -359,16 +359,34 @@ class Bound(Table):
 
 
 class Avoidance(Table):
-    """Settings of reciprocal avoidance that differ from the engine's own."""
+    """Settings of avoidance that differ from the engine's own; see `crowd.navigation.avoidance`."""
 
-    time_horizon: Annotated[float, Field(gt=0.0, le=20.0)] | None = None
-    """Time ahead in which meetings are avoided, s, > 0. Larger: smoother turns, less room in a jam."""
-    wall_time_horizon: Annotated[float, Field(gt=0.0, le=20.0)] | None = None
-    """The same against walls, s, > 0. Larger: people refuse narrow doors."""
-    neighbor_distance: Annotated[float, Field(gt=0.0, le=50.0)] | None = None
-    """Distance up to which others are seen, m, > 0."""
-    neighbor_count: Annotated[int, Field(ge=1, le=64)] | None = None
-    """Most others considered, nearest first, 1 to 64."""
+    neighbour_count: Annotated[int, Field(ge=1, le=64)] | None = None
+    """Nearest others that a character avoids."""
+    neighbour_distance: Annotated[float, Field(ge=0.5, le=50.0)] | None = None
+    """Others farther away are ignored, m."""
+    time_horizon: Annotated[float, Field(ge=0.1, le=10.0)] | None = None
+    """Time ahead for which others are avoided, s. Larger: earlier, wider evasion."""
+    wall_time_horizon: Annotated[float, Field(ge=0.1, le=5.0)] | None = None
+    """Time ahead for which walls are avoided, s. Larger: people refuse narrow doors."""
+    contact_horizon: Annotated[float, Field(ge=0.01, le=1.0)] | None = None
+    """Time in which overlapping people want to be apart, s. Larger: they separate more gently."""
+    perturbation: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
+    """Disturbance of the preferred velocity that breaks deadlocks, m/s. Larger: sooner, less straight."""
+    maximum_acceleration: Annotated[float, Field(ge=1e-3)] | None = None
+    """Largest change of velocity, m/s^2. Smaller: smoother and later evasion."""
+    crowd_slowdown: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    """How much people slow down in a crowd: 0 not at all, 1 as measured in real crowds."""
+    contact_passes: Annotated[int, Field(ge=1, le=50)] | None = None
+    """Passes that separate every overlapping pair. More: less overlap, more time."""
+    most_contact_passes: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Passes at most while some overlap is deeper than `wanted_depth`."""
+    contact_rounds: Annotated[int, Field(ge=1, le=50)] | None = None
+    """Times at most that pairs are listed anew in one step. More resolves larger piles."""
+    wanted_depth: Annotated[float, Field(ge=0.001, le=0.05)] | None = None
+    """Overlap that is left alone in the later passes, m. Smaller: more passes."""
+    contact_margin: Annotated[float, Field(ge=0.01, le=1.0)] | None = None
+    """Pairs up to this far apart are watched while bodies are pushed, m. Larger: more pairs, fewer rounds."""
 
 
 class Scenario(Table):

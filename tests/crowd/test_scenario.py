@@ -1,13 +1,16 @@
 """Scenario files: every mistake gives one line with file, line, key, what was found and what is allowed."""
 
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 import crowd.scenario.load as load
-from crowd.errors import ScenarioError
+from crowd.errors import ScenarioError, SettingsError
+from crowd.navigation.avoidance import AvoidanceSettings
 from crowd.scenario import bundled_scenarios, load_scenario, place
-from crowd.scenario.schema import Scenario
+from crowd.scenario.schema import Avoidance, Scenario
 
 VALID = """\
 description = "one walker"
@@ -256,3 +259,26 @@ def test_scenarios_can_be_made_in_python() -> None:
     assert place(scenario, seed=0).count == 3
     with pytest.raises(ScenarioError, match=r"^scenario: world: is missing$"):
         load.scenario_from({}, load.ScenarioSource())
+
+
+def test_avoidance_can_be_set_as_the_engine_knows_it(tmp_path: Path) -> None:
+    names = [declared.name for declared in fields(AvoidanceSettings)]
+    assert list(Avoidance.model_fields) == names
+    scenario = load_scenario(written(tmp_path, VALID + "\n[avoidance]\ntime_horizon = 3.0\n"))
+    changed = {key: value for key, value in scenario.avoidance.model_dump().items() if value is not None}
+    assert AvoidanceSettings(**changed).time_horizon == 3.0
+
+
+@pytest.mark.parametrize("name", sorted(Avoidance.model_fields))
+@pytest.mark.parametrize("value", [-1.0, 0.0, 0.005, 0.05, 0.3, 1.0, 7.0, 30.0, 200.0, 2000.0])
+def test_avoidance_has_the_ranges_of_the_engine(name: str, value: float) -> None:
+    wanted = int(value) if name.endswith(("count", "passes", "rounds")) else value
+    verdicts = []
+    for make in (AvoidanceSettings, Avoidance):
+        try:
+            make(**{name: wanted})
+        except (SettingsError, ValidationError):
+            verdicts.append("refused")
+        else:
+            verdicts.append("taken")
+    assert verdicts[0] == verdicts[1]
