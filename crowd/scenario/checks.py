@@ -1,5 +1,7 @@
 """What can be said about a scenario as a whole before anybody is placed."""
 
+from collections.abc import Collection
+
 import numpy as np
 import shapely
 
@@ -49,6 +51,32 @@ def check(scenario: Scenario) -> None:
     _check_goals(scenario, problems)
     _check_individuals(scenario, problems)
     _check_names(scenario, problems)
+    problems.raise_if_any()
+
+
+def check_clips(scenario: Scenario, known: Collection[str]) -> None:
+    """Check that the clips a scenario plays exist.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    known : collection of str
+        Names of the clips that can be played.
+
+    Raises
+    ------
+    ScenarioError
+        With a line for each unknown name.
+    """
+    problems = Problems(scenario.source)
+    named: list[tuple[Location, str]] = []
+    for table in ("characters", "regions", "flows"):
+        for index, owner in enumerate(getattr(scenario, table)):
+            named.extend(((table, index, "gestures", n), clip) for n, clip in enumerate(owner.gestures))
+    named.extend((("plays", index, "clip"), play.clip) for index, play in enumerate(scenario.plays))
+    for location, clip in named:
+        if clip not in known:
+            problems.add(location, "unknown clip", clip, nearest_first(clip, known))
     problems.raise_if_any()
 
 

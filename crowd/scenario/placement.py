@@ -78,6 +78,8 @@ class PlacedCharacters:
     ----------
     name : tuple of str
         ``"regions[0][17]"`` where nobody gave a name; for messages.
+    location : tuple of location
+        Table of the scenario that each person comes from, such as ``("regions", 0)``.
     position_world : (N, 3) float64
         Start, m. For slots of flows, the middle of the source.
     yaw : (N,) float64
@@ -108,6 +110,7 @@ class PlacedCharacters:
     """
 
     name: tuple[str, ...]
+    location: tuple[Location, ...]
     position_world: FloatArray
     yaw: FloatArray
     radius: FloatArray
@@ -402,6 +405,7 @@ class _Builder:
         ]
         return PlacedCharacters(
             name=tuple(person.name for person in people),
+            location=tuple(person.location for person in people),
             position_world=position_world,
             yaw=yaw,
             radius=np.array([person.radius for person in people], np.float64),

@@ -10,6 +10,7 @@ import crowd.scenario.load as load
 from crowd.errors import ScenarioError, SettingsError
 from crowd.navigation.avoidance import AvoidanceSettings
 from crowd.scenario import bundled_scenarios, load_scenario, place
+from crowd.scenario.checks import check_clips
 from crowd.scenario.schema import Avoidance, Scenario
 
 VALID = """\
@@ -282,3 +283,14 @@ def test_avoidance_has_the_ranges_of_the_engine(name: str, value: float) -> None
         else:
             verdicts.append("taken")
     assert verdicts[0] == verdicts[1]
+
+
+def test_unknown_clips_are_named_with_their_keys(tmp_path: Path) -> None:
+    text = VALID.replace('name = "anna"', 'name = "anna"\ngestures = ["wave", "wawe"]')
+    scenario = load_scenario(written(tmp_path, text + '\n[[plays]]\nclip = "nood"\nat = 1.0\n'))
+    with pytest.raises(ScenarioError) as caught:
+        check_clips(scenario, ["wave", "nod"])
+    assert str(caught.value).splitlines() == [
+        'scene.toml: line 9: characters[0].gestures[1]: unknown clip; got \'wawe\'; allowed "wave", "nod"',
+        'scene.toml: line 14: plays[0].clip: unknown clip; got \'nood\'; allowed "nod", "wave"',
+    ]
