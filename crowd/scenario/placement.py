@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from crowd.errors import ScenarioError, describe
 from crowd.scenario.geometry import Ground, overlapping_pairs
 from crowd.scenario.plays import PlaySchedule, build_plays
+from crowd.scenario.scaling import scaled
 from crowd.scenario.schema import (
     ADULT_STATURE,
     Area,
     Character,
-    Circle,
     Flow,
     Goal,
     GoalList,
@@ -27,7 +26,7 @@ from crowd.scenario.schema import (
     Spread,
 )
 from crowd.scenario.source import Location, Problems
-from crowd.scenario.starts import Starts
+from crowd.scenario.starts import Starts, on_circle
 from crowd_kernels.random import normal, uniform
 
 FloatArray = npt.NDArray[np.float64]
@@ -136,42 +135,6 @@ class PlacedCharacters:
         return len(self.name)
 
 
-def scaled(scenario: Scenario, characters: int) -> Scenario:
-    """Change the number of people at the start: individuals stay, regions share the rest in proportion.
-
-    Raises
-    ------
-    ScenarioError
-        More people are asked for than there are individuals, and there is no region to add them to.
-    """
-    if characters < 1:
-        raise ScenarioError(describe("characters", "must be positive", characters, "at least 1"))
-    individuals = scenario.characters[:characters]
-    rest = characters - len(individuals)
-    if rest and not scenario.regions:
-        raise ScenarioError(
-            describe(
-                scenario.source.label,
-                "has only individuals, no region to add people to",
-                characters,
-                f"1 to {len(scenario.characters)} characters",
-            )
-        )
-    total = sum(region.count for region in scenario.regions)
-    shares = [rest * region.count / total for region in scenario.regions] if total else []
-    counts = [math.floor(share) for share in shares]
-    by_remainder = sorted(range(len(shares)), key=lambda index: (counts[index] - shares[index], index))
-    for index in by_remainder[: rest - sum(counts)]:
-        counts[index] += 1
-    regions = tuple(
-        region.model_copy(update={"count": count})
-        for region, count in zip(scenario.regions, counts, strict=True)
-    )
-    changed = scenario.model_copy(update={"characters": individuals, "regions": regions})
-    changed._source = scenario.source
-    return changed
-
-
 def place(scenario: Scenario, seed: int, characters: int | None = None) -> PlacedCharacters:
     """Place everybody and draw what differs between people.
 
@@ -219,13 +182,6 @@ def draw(spread: Spread, seed: int, key: int, purpose: int) -> float:
         if low <= value <= high:
             return value
     return min(max(spread.mean, low), high)
-
-
-def _places_on_circle(circle: Circle, count: int) -> list[Point]:
-    angle = 2.0 * math.pi * np.arange(count) / count
-    x = circle.center[0] + circle.radius * np.sin(angle)
-    z = circle.center[1] + circle.radius * np.cos(angle)
-    return list(zip(x.tolist(), z.tolist(), strict=True))
 
 
 @dataclass
@@ -285,7 +241,7 @@ class _Builder:
         """Reserve the places around circles, so that random starts keep clear of them."""
         for index, region in enumerate(self.scenario.regions):
             if region.circle is not None:
-                for number, point in enumerate(_places_on_circle(region.circle, region.count)):
+                for number, point in enumerate(on_circle(region)):
                     key = (index + 1) * PEOPLE_PER_TABLE + number
                     self.starts.take(point, draw(region.radius, self.seed, key, PURPOSE_RADIUS))
 
@@ -296,7 +252,7 @@ class _Builder:
         keys = range(first_key, first_key + region.count)
         radius = [draw(region.radius, self.seed, key, PURPOSE_RADIUS) for key in keys]
         if region.circle is not None:
-            places = _places_on_circle(region.circle, region.count)
+            places = on_circle(region)
             center = region.circle.center
             for place_index, (point, r) in enumerate(zip(places, radius, strict=True)):
                 self._check_start(location, place_index, point, r)

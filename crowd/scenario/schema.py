@@ -4,6 +4,7 @@ Ground points are ``[x, z]`` in metres, angles are degrees about the vertical: 0
 +z, positive turns left.
 """
 
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -17,6 +18,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from crowd.errors import SettingsError, nearest_first
+from crowd.navigation.avoidance import AvoidanceSettings
 from crowd.scenario.source import ScenarioSource
 
 DEFAULT_DT = 1.0 / 60.0
@@ -359,34 +362,30 @@ class Bound(Table):
 
 
 class Avoidance(Table):
-    """Settings of avoidance that differ from the engine's own; see `crowd.navigation.avoidance`."""
+    """Fields of `crowd.navigation.avoidance.AvoidanceSettings` that differ from the engine's own."""
 
-    neighbour_count: Annotated[int, Field(ge=1, le=64)] | None = None
-    """Nearest others that a character avoids."""
-    neighbour_distance: Annotated[float, Field(ge=0.5, le=50.0)] | None = None
-    """Others farther away are ignored, m."""
-    time_horizon: Annotated[float, Field(ge=0.1, le=10.0)] | None = None
-    """Time ahead for which others are avoided, s. Larger: earlier, wider evasion."""
-    wall_time_horizon: Annotated[float, Field(ge=0.1, le=5.0)] | None = None
-    """Time ahead for which walls are avoided, s. Larger: people refuse narrow doors."""
-    contact_horizon: Annotated[float, Field(ge=0.01, le=1.0)] | None = None
-    """Time in which overlapping people want to be apart, s. Larger: they separate more gently."""
-    perturbation: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
-    """Disturbance of the preferred velocity that breaks deadlocks, m/s. Larger: sooner, less straight."""
-    maximum_acceleration: Annotated[float, Field(ge=1e-3)] | None = None
-    """Largest change of velocity, m/s^2. Smaller: smoother and later evasion."""
-    crowd_slowdown: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
-    """How much people slow down in a crowd: 0 not at all, 1 as measured in real crowds."""
-    contact_passes: Annotated[int, Field(ge=1, le=50)] | None = None
-    """Passes that separate every overlapping pair. More: less overlap, more time."""
-    most_contact_passes: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """Passes at most while some overlap is deeper than `wanted_depth`."""
-    contact_rounds: Annotated[int, Field(ge=1, le=50)] | None = None
-    """Times at most that pairs are listed anew in one step. More resolves larger piles."""
-    wanted_depth: Annotated[float, Field(ge=0.001, le=0.05)] | None = None
-    """Overlap that is left alone in the later passes, m. Smaller: more passes."""
-    contact_margin: Annotated[float, Field(ge=0.01, le=1.0)] | None = None
-    """Pairs up to this far apart are watched while bodies are pushed, m. Larger: more pairs, fewer rounds."""
+    model_config = ConfigDict(extra="allow")
+
+    @model_validator(mode="after")
+    def _is_understood(self) -> "Avoidance":
+        kinds = {declared.name: type(declared.default) for declared in fields(AvoidanceSettings)}
+        for name, value in self.changed.items():
+            if name not in kinds:
+                raise refuse("unknown key", nearest_first(name, kinds), name)
+            is_whole = isinstance(value, int) and not isinstance(value, bool)
+            if not is_whole and (kinds[name] is int or not isinstance(value, float)):
+                kind = "a whole number" if kinds[name] is int else "a number"
+                raise refuse(f"must be {kind}", kind, name, value)
+            try:
+                AvoidanceSettings(**{name: value})
+            except SettingsError as error:
+                raise refuse("is out of range", str(error).rpartition("; allowed ")[2], name, value) from None
+        return self
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """Settings that were given."""
+        return dict(self.model_extra or {})
 
 
 class Scenario(Table):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crowd.scenario.geometry import Ground
-from crowd.scenario.schema import Area, Point
+from crowd.scenario.schema import Area, Point, Region
 from crowd_kernels.random import uniform
 
 PURPOSE_START_X = 111
@@ -16,6 +16,26 @@ PURPOSE_START_ORDER = 113
 CELL = 1.0
 ATTEMPTS = 1024
 BATCH = 32
+
+
+def on_circle(region: Region) -> list[Point]:
+    """Space the people of a region evenly around its circle, and around wider ones when it is full."""
+    assert region.circle is not None
+    pitch = 2.0 * region.radius.bounds[1] + region.spacing
+    center, radius = region.circle.center, region.circle.radius
+    places: list[Point] = []
+    while len(places) < region.count:
+        left = region.count - len(places)
+        # Neighbours are a chord of one pitch apart.
+        fitting = (
+            math.floor(math.pi / math.asin(pitch / (2.0 * radius)) + 1e-9) if pitch < 2.0 * radius else 1
+        )
+        count = min(left, fitting)
+        for number in range(count):
+            angle = 2.0 * math.pi * number / count
+            places.append((center[0] + radius * math.sin(angle), center[1] + radius * math.cos(angle)))
+        radius += pitch
+    return places
 
 
 class Starts:

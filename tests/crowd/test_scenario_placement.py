@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from crowd.errors import ScenarioError
 from crowd.scenario import PlacedCharacters, Scenario, load_scenario, place
+from crowd.scenario.geometry import Ground
 
 HALL = {"bounds": {"x": (-10, 10), "z": (-10, 10)}, "boxes": [{"x": (-2, 2), "z": (-2, 2)}]}
 
@@ -209,3 +210,29 @@ def test_a_file_in_messages_survives_scaling(tmp_path: Path) -> None:
         ScenarioError, match=r"^small\.toml: line 4: regions\[0\]\.count: region is too small"
     ):
         place(load_scenario(path), seed=0, characters=50)
+
+
+def test_a_full_circle_continues_on_wider_ones() -> None:
+    people = place(load_scenario("circle_swap"), seed=0, characters=300)
+    assert people.count == 300
+    assert least_gap(people) >= 0.1 - 1e-9
+    distance = np.linalg.norm(people.position_world, axis=1)
+    assert distance.min() == pytest.approx(11.0)
+    assert len(np.unique(distance.round(6))) == 3
+
+
+def test_standing_groups_keep_their_size_when_the_rest_grows() -> None:
+    people = place(load_scenario("plaza"), seed=0, characters=400)
+    assert people.count == 400
+    assert (people.goal_count == 0).sum() == 25
+    fewer = place(load_scenario("plaza"), seed=0, characters=40)
+    assert (fewer.goal_count == 0).sum() == 5
+
+
+@pytest.mark.parametrize("name", ["plaza", "circle_swap", "corridor", "bottleneck", "maze"])
+def test_bundled_scenarios_have_room_with_every_seed(name: str) -> None:
+    scenario = load_scenario(name)
+    for seed in range(30):
+        people = place(scenario, seed)
+        assert least_gap(people) >= 0.0
+        assert Ground(scenario.world).clearance(people.goal_world[:, [0, 2]]).min() >= 0.2
