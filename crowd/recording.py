@@ -114,6 +114,8 @@ class Recorder:
         }
         self._times = np.zeros(self._block)
         self._block_bytes = self._times.nbytes + sum(buffer.nbytes for buffer in self._buffers.values())
+        # Kept open: HDF5 writes what it holds of a dataset when the last reference to it goes.
+        self._datasets: dict[str, h5py.Dataset] = {}
         self._file: h5py.File | None = None
         try:
             self._file = h5py.File(self.path, "w", libver="latest")
@@ -164,6 +166,7 @@ class Recorder:
         self._write()
         os.ftruncate(self._descriptor, self._file.id.get_filesize())
         file, self._file = self._file, None
+        self._datasets.clear()
         try:
             file.close()
         except (OSError, RuntimeError) as error:
@@ -185,11 +188,11 @@ class Recorder:
         try:
             self._reserve()
             for name, buffer in self._buffers.items():
-                dataset = self._file["frames"][name]
+                dataset = self._datasets[name]
                 dataset.resize(last, axis=0)
                 dataset[first:last] = buffer[: self._pending]
             self._file.flush()
-            times = self._file["frames"]["time"]
+            times = self._datasets["time"]
             times.resize(last, axis=0)
             times[first:last] = self._times[: self._pending]
             self._file.flush()
@@ -225,6 +228,7 @@ class Recorder:
             os.dup2(nowhere, self._descriptor)
             os.close(nowhere)
         file, self._file = self._file, None
+        self._datasets.clear()
         # The error that led here is the one to report.
         with suppress(OSError, RuntimeError):
             file.close()
@@ -281,7 +285,8 @@ class Recorder:
                 shuffle=True,
             )
             dataset.attrs["meaning"] = field.meaning
-        frames.create_dataset(
+            self._datasets[name] = dataset
+        self._datasets["time"] = frames.create_dataset(
             "time", shape=(0,), maxshape=(None,), dtype=np.float64, chunks=(1024,), fillvalue=np.nan
         )
 
@@ -467,11 +472,11 @@ def _reason(error: BaseException) -> str:
     """Say in a few words why a file operation failed."""
     if isinstance(error, OSError) and error.errno is not None:
         return os.strerror(error.errno)
-    text = str(error).splitlines()[0] if str(error) else type(error).__name__
-    for known in ("No space left on device", "File too large", "Permission denied", "Is a directory"):
-        if known.lower() in text.lower():
-            return known
-    return text
+    text = str(error)
+    for number in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EACCES, errno.EISDIR):
+        if os.strerror(number) in text:
+            return os.strerror(number)
+    return text.splitlines()[0] if text else type(error).__name__
 
 
 def _product(first: FloatArray, second: FloatArray) -> FloatArray:
