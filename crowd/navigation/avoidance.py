@@ -51,6 +51,9 @@ class AvoidanceSettings:
     larger value breaks them sooner and makes paths less straight."""
     maximum_acceleration: float = math.inf
     """Largest change of velocity, m/s^2, above 0. A smaller value gives smoother and later evasion."""
+    follower_share: float = 0.0
+    """How much more those behind give way to those in front than the other way round, 0 (alike) to 1 (those
+    in front do not yield). A larger value keeps queues moving."""
     crowd_slowdown: float = 0.0
     """How much people slow down in a crowd, 0 (not at all) to 1 (as measured by Weidmann)."""
     contact_passes: int = 4
@@ -84,6 +87,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "contact_horizon": (0.01, 1.0),
     "perturbation": (0.0, 0.1),
     "maximum_acceleration": (1e-3, math.inf),
+    "follower_share": (0.0, 1.0),
     "crowd_slowdown": (0.0, 1.0),
     "contact_passes": (1, 50),
     "most_contact_passes": (1, 1000),
@@ -169,6 +173,7 @@ class Avoidance:
             max(settings.contact_horizon, dt),
             settings.perturbation,
             settings.maximum_acceleration,
+            settings.follower_share,
             settings.crowd_slowdown,
         )
 

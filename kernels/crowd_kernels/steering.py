@@ -12,7 +12,7 @@ from crowd_kernels.random import mix
 from crowd_kernels.walls import WallTable, wall_lines
 
 VELOCITY_X, VELOCITY_Z, RADIUS, RESPONSIBILITY = 0, 1, 2, 3
-PREFERRED_X, PREFERRED_Z, MAXIMUM_SPEED = 4, 5, 6
+PREFERRED_X, PREFERRED_Z, MAXIMUM_SPEED, INVERSE_PREFERRED = 4, 5, 6, 7
 BODY_COLUMNS = 8
 """One cache line for each character."""
 PURPOSE_SYMMETRY = 0x5E7
@@ -21,6 +21,8 @@ NO_LENGTH = 1e-9
 JAM_DENSITY = 5.4
 WEIDMANN_GAMMA = 1.913
 SLOWEST_SHARE = 0.1
+SMALLEST_SHARE = 0.05
+"""Who would take on less than this of an avoidance leaves all of it to the other."""
 
 
 class AvoidanceLimits(NamedTuple):
@@ -40,6 +42,8 @@ class AvoidanceLimits(NamedTuple):
     """Size of the deterministic disturbance of the preferred velocity, m/s."""
     maximum_acceleration: float
     """Largest change of velocity, m/s^2."""
+    follower_share: float
+    """How much more those behind give way to those in front than the other way round, 0 to 1."""
     crowd_slowdown: float
     """0 no slowing down in a crowd, 1 as measured by Weidmann."""
 
@@ -86,6 +90,8 @@ def gather_bodies_crowd(
             is_known = math.isfinite(px) and math.isfinite(pz)
             out_body[first + PREFERRED_X] = px if is_known else 0.0
             out_body[first + PREFERRED_Z] = pz if is_known else 0.0
+            speed = math.sqrt(px * px + pz * pz)
+            out_body[first + INVERSE_PREFERRED] = 1.0 / speed if is_known and speed > NO_LENGTH else 0.0
             out_body[first + RADIUS] = radius[own]
             share = responsibility[own]
             out_body[first + RESPONSIBILITY] = min(max(share, 0.0), 1.0) if math.isfinite(share) else 0.5
@@ -242,10 +248,17 @@ def neighbor_lines(
     for entry in range(found):
         other = slot_of_character[keys[entry] & NUMBER_MASK]
         theirs = other * BODY_COLUMNS
-        share = share_of(body[first + RESPONSIBILITY], body[theirs + RESPONSIBILITY])
-        if share == 0.0:
-            continue
         to_x, to_z = point[2 * other] - x, point[2 * other + 1] - z
+        own_weight, their_weight = body[first + RESPONSIBILITY], body[theirs + RESPONSIBILITY]
+        if limits.follower_share > 0.0:
+            scale = limits.follower_share / math.sqrt(max(to_x * to_x + to_z * to_z, NO_LENGTH))
+            along = to_x * body[first + PREFERRED_X] + to_z * body[first + PREFERRED_Z]
+            own_weight *= 1.0 + scale * along * body[first + INVERSE_PREFERRED]
+            along = to_x * body[theirs + PREFERRED_X] + to_z * body[theirs + PREFERRED_Z]
+            their_weight *= 1.0 - scale * along * body[theirs + INVERSE_PREFERRED]
+        share = share_of(own_weight, their_weight)
+        if share < SMALLEST_SHARE:
+            continue
         apart_x, apart_z = 0.0, 0.0
         if to_x * to_x + to_z * to_z < NO_LENGTH * NO_LENGTH:
             low, high = min(character[slot], character[other]), max(character[slot], character[other])
