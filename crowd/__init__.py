@@ -10,3 +10,4 @@ import os
 
 # Threads that wait for work by spinning would take the core of a viewer or of a second run.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+

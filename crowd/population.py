@@ -28,7 +28,9 @@ STALLED_TIME = 3.0
 class GoalReceiver(Protocol):
     """Whoever routes people to their goals."""
 
-    def set_goals(self, characters: IntArray, goal_world: FloatArray, radius: FloatArray) -> None:
+    def set_goals(
+        self, characters: IntArray, goal_world: FloatArray, radius: FloatArray, position_world: FloatArray
+    ) -> None:
         """Route characters to new goals."""
 
 
@@ -151,7 +153,7 @@ class Population:
         state.is_finished[rows] = False
         state.wants_to_walk[rows] = True
         self.stalled_time[rows] = 0.0
-        self.routing.set_goals(rows, goal_world, self.model.people.radius[rows])
+        self.routing.set_goals(rows, goal_world, self.model.people.radius[rows], state.position_world)
 
     def _send(self, state: State, rows: IntArray) -> None:
         """Route people to the present goal of their lists."""
@@ -165,7 +167,7 @@ class Population:
         state.wanted_speed[rows] = np.where(np.isnan(speed), people.preferred_speed[rows], speed)
         state.wants_to_walk[rows] = True
         self.stalled_time[rows] = 0.0
-        self.routing.set_goals(rows, state.goal_world[rows], people.radius[rows])
+        self.routing.set_goals(rows, state.goal_world[rows], people.radius[rows], state.position_world)
 
     def _goal_points(self, state: State, rows: IntArray, goal: npt.NDArray[np.int64]) -> FloatArray:
         """Points of goals; in a goal area each visit draws its own free point."""

@@ -94,7 +94,7 @@ class Simulation:
         self.model.timetable.update(self.model.world, 0.0)
         self.navigator = Navigator(self.model, avoidance_settings(scenario))
         self.population = Population(self.model, seed, self.navigator.routing)
-        self.world_offset = WorldOffset(capacity)
+        self.world_offset = WorldOffset()
         self.idle = Idle(capacity)
         self.locomotion = Locomotion(capacity)
         self.animation = Animation(capacity)

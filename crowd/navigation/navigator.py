@@ -9,8 +9,10 @@ from crowd.controllers.controller import Step
 from crowd.model import Model
 from crowd.navigation.avoidance import Avoidance, AvoidanceSettings
 from crowd.navigation.patience import Patience
-from crowd.navigation.routing import Routing
+from crowd.navigation.routing import Routing, RoutingSettings
 
+from crowd.scenario import PlacedCharacters, Scenario
+from crowd.state import FloatArray
 from crowd_kernels.locomotion import prefer_crowd
 
 BRAKING_TIME = 0.8
@@ -33,7 +35,7 @@ class Navigator:
     def __init__(self, model: Model, settings: AvoidanceSettings) -> None:
         capacity = model.capacity
         self.model = model
-        self.routing = Routing(model.world, capacity)
+        self.routing = Routing(model.world, capacity, shared_goals(model.placed))
         self.avoidance = Avoidance(settings, capacity)
         self.patience = Patience(capacity)
         self._responsibility = np.full(capacity, 0.5)
@@ -52,7 +54,6 @@ class Navigator:
         walking = step.active[state.wants_to_walk[step.active]]
         self.routing.way_points(
             state.position_world,
-            self.model.people.radius,
             walking,
             step.index,
             state.way_point_world,
@@ -77,6 +78,17 @@ class Navigator:
             state.preferred_velocity_world,
         )
         self._responsibility[:] = np.where(state.wants_to_walk, 0.5, STANDING_RESPONSIBILITY)
+        self._mobility[:] = 1.0
+        self.patience.update(
+            state.position_world,
+            state.preferred_velocity_world,
+            step.active,
+            step.dt,
+            step.seed,
+            step.index,
+            self._responsibility,
+            self._mobility,
+        )
         np.maximum(HASTE * self._wanted_speed, SHORTEST_MAXIMUM_SPEED, out=self._maximum_speed)
         self.avoidance.steer(
             state.position_world,
@@ -89,6 +101,8 @@ class Navigator:
             self.model.world.walls,
             step.dt,
             state.desired_velocity_world,
+            seed=step.seed,
+            step=step.index,
         )
 
     def move_discs(self, step: Step) -> None:
@@ -112,8 +126,20 @@ class Navigator:
             step.active,
             self.model.world.walls,
             step.dt,
+            seed=step.seed,
         )
         moved = state.position_world[step.active] - state.previous_position_world[step.active]
         state.velocity_world[step.active] = moved / step.dt
 
 
+def avoidance_settings(scenario: Scenario) -> AvoidanceSettings:
+    """The engine's avoidance settings with what the scenario changes."""
+    changed = {name: value for name, value in scenario.avoidance.model_dump().items() if value is not None}
+    return AvoidanceSettings(**changed)
+
+
+def shared_goals(placed: PlacedCharacters) -> FloatArray:
+    """Goal points that enough characters have for a distance field to pay."""
+    points = placed.goal_world[~placed.goal_is_area]
+    unique, count = np.unique(points, axis=0, return_counts=True)
+    return unique[count >= RoutingSettings().sharing]

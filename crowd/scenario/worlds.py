@@ -1,8 +1,7 @@
 """Build a scenario's world, and let obstacles come and go by its timetable."""
 
+import math
 from dataclasses import dataclass
-
-import shapely
 
 from crowd.scenario.schema import Box, Polygon, Scenario, TimedObstacle, Wall
 from crowd.world import World
@@ -50,3 +49,19 @@ def obstacle_shapes(obstacle: TimedObstacle) -> list[shapes.Shape]:
             pairs = zip(obstacle.points, obstacle.points[1:], strict=False)
             return [shapes.Wall(start, end, height=obstacle.height) for start, end in pairs]
     raise TypeError(type(obstacle).__name__)
+
+
+def build_world(scenario: Scenario) -> tuple[World, TimedObstacles]:
+    """Make the world of a scenario with what is always there, and the timetable of the rest."""
+    ground = scenario.world
+    permanent: list[shapes.Shape] = []
+    timed: list[TimedShape] = []
+    for obstacle in (*ground.boxes, *ground.polygons, *ground.walls):
+        made = obstacle_shapes(obstacle)
+        if obstacle.is_permanent:
+            permanent.extend(made)
+        else:
+            end = math.inf if obstacle.disappear_at is None else obstacle.disappear_at
+            timed.extend(TimedShape(shape, obstacle.appear_at, end) for shape in made)
+    bounds = (*ground.bounds.x, *ground.bounds.z)
+    return World(bounds, permanent), TimedObstacles(tuple(timed))

@@ -1,1 +1,5 @@
-"""TODO."""
+"""The world that people walk in."""
+
+from crowd.world.world import World
+
+__all__ = ["World"]

@@ -1,0 +1,129 @@
+"""The world: bounds, obstacles that may come and go, walls for avoidance, grids for finding ways."""
+
+import hashlib
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from crowd.world.grid import Bounds, Grid, Layout
+from crowd.world.obstacles import Shape, Wall
+from crowd.world.walls import Walls
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+CELL_SIZE = 0.25
+RADIUS_STEP = 0.05
+"""Bodies share a grid with others whose radius rounds up to the same multiple of this, m."""
+
+
+class World:
+    """Ground with obstacles.
+
+    Parameters
+    ----------
+    bounds : tuple of float
+        Lowest and highest x, lowest and highest z, m. Nobody walks outside.
+    obstacles : sequence of Shape
+    cell_size : float
+        Cells of the walkable grids, m.
+    """
+
+    def __init__(self, bounds: Bounds, obstacles: Sequence[Shape] = (), cell_size: float = CELL_SIZE) -> None:
+        if not (math.isfinite(sum(bounds)) and bounds[0] < bounds[1] and bounds[2] < bounds[3]):
+            raise ValueError(f"world: bounds are {bounds}; allowed x low < x high, z low < z high, finite")
+        self.bounds = bounds
+        self.layout = Layout.over(bounds, cell_size)
+        self._obstacles: dict[int, Shape] = dict(enumerate(obstacles))
+        self._next_number = len(self._obstacles)
+        self._refresh()
+
+    @property
+    def obstacles(self) -> tuple[Shape, ...]:
+        """Obstacles that are there now."""
+        return tuple(self._obstacles.values())
+
+    def add_obstacle(self, shape: Shape) -> int:
+        """Put an obstacle down; returns its number for `remove_obstacle`."""
+        number = self._next_number
+        self._next_number += 1
+        self._obstacles[number] = shape
+        self._refresh()
+        return number
+
+    def remove_obstacle(self, number: int) -> None:
+        """Take an obstacle away.
+
+        Raises
+        ------
+        KeyError
+            There is none of this number.
+        """
+        del self._obstacles[number]
+        self._refresh()
+
+    def grid(self, radius: float) -> Grid:
+        """The walkable grid for a body radius, m."""
+        step = radius_class(radius)
+        if step not in self._grids:
+            self._grids[step] = Grid.build(self.layout, self._tree, step * RADIUS_STEP)
+        return self._grids[step]
+
+    def clearance_at(self, points_world: FloatArray) -> FloatArray:
+        """Distance of points (P, 3) to the nearest obstacle, m; 0 inside, infinite without obstacles."""
+        points = np.ascontiguousarray(points_world[:, [0, 2]])
+        distance = np.full(len(points), np.inf)
+        if self._obstacles and len(points):
+            (asked, _), gap = self._tree.query_nearest(
+                shapely.points(points), return_distance=True, all_matches=False
+            )
+            distance[asked] = gap
+        return distance
+
+    def is_inside_bounds(self, points_world: FloatArray) -> BoolArray:
+        """Which points (P, 3) lie inside the bounds."""
+        x, z = points_world[:, 0], points_world[:, 2]
+        low_x, high_x, low_z, high_z = self.bounds
+        return (x >= low_x) & (x <= high_x) & (z >= low_z) & (z <= high_z)
+
+    def is_walkable(self, points_world: FloatArray, radius: float) -> BoolArray:
+        """At which points (P, 3) a body fits."""
+        return self.is_inside_bounds(points_world) & (self.clearance_at(points_world) >= radius - 1e-6)
+
+    def nearest_walkable(self, points_world: FloatArray, radius: float) -> FloatArray:
+        """The points (P, 3) themselves where a body fits, else the nearest places of the grid."""
+        result = np.array(points_world, dtype=np.float64)
+        wrong = np.flatnonzero(~self.is_walkable(result, radius))
+        if len(wrong):
+            grid = self.grid(radius)
+            cells = grid.nearest_cells(result[wrong][:, [0, 2]])
+            result[wrong[:, None], [0, 2]] = grid.point[cells]
+        return result
+
+    def is_reachable(self, start_world: FloatArray, goal_world: FloatArray, radius: float) -> BoolArray:
+        """Between which pairs of points (P, 3) a body finds a way."""
+        grid = self.grid(radius)
+        starts = grid.nearest_cells(start_world[:, [0, 2]])
+        goals = grid.nearest_cells(goal_world[:, [0, 2]])
+        return (starts >= 0) & (goals >= 0) & (grid.component[starts] == grid.component[goals])
+
+    def _refresh(self) -> None:
+        """Rebuild what depends on obstacles; grids are made again when they are asked for."""
+        shapes = self._obstacles.values()
+        outlines = b"".join(shape.outline().tobytes() + b";" for shape in self._obstacles.values())
+        self.digest = np.frombuffer(hashlib.blake2s(outlines, digest_size=16).digest(), np.uint8)
+        """Sixteen bytes that differ between different obstacles."""
+        self._tree = shapely.STRtree([shape.geometry() for shape in shapes])
+        self._grids: dict[int, Grid] = {}
+        self.walls = Walls.build(
+            polygons=[shape.outline() for shape in shapes if not isinstance(shape, Wall)],
+            segments=[shape.outline() for shape in shapes if isinstance(shape, Wall)],
+        )
+
+
+def radius_class(radius: float) -> int:
+    """Number of the grid that a body shares with others of nearly its radius."""
+    return max(math.ceil(radius / RADIUS_STEP - 1e-6), 1)
