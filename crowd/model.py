@@ -14,6 +14,8 @@ from crowd.motion.procedural import built_in_library
 from crowd.motion.skeleton import Skeleton
 from crowd.people import People
 from crowd.scenario import PlacedCharacters, Scenario, place
+from crowd.scenario.checks import check_clips
+from crowd.scenario.reach import check_reachable
 from crowd.scenario.worlds import TimedObstacles, build_world
 from crowd.world import World
 
@@ -77,10 +79,10 @@ class Model:
                 describe(f'motion library "{library.name}"', "has no idle clip", allowed="at least one")
             )
         names = [table.names[clip] for clip in table.example_clip]
+        check_clips(scenario, [clip.name for clip in library.clips if clip.kind is not ClipKind.LOCOMOTION])
         placed = place(scenario, seed, characters)
-        for clip in sorted(placed.plays.clips):
-            library.clip(clip)
         world, timetable = build_world(scenario)
+        check_reachable(scenario, placed, world)
         return cls(
             library,
             table,

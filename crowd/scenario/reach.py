@@ -42,10 +42,11 @@ def check_reachable(scenario: Scenario, placed: PlacedCharacters, world: World) 
             continue
         reported.add(location)
         x, z = start[goal, [0, 2]].round(3).tolist()
+        radius = f"{placed.radius[row]:.3g} m"
         problems.add(
             location,
             "goal cannot be reached",
             placed.goal_world[goal, [0, 2]].round(3).tolist(),
-            f"a point to which a way leads from [{x:g}, {z:g}] for a body of radius {placed.radius[row]:.3g} m",
+            f"a point to which a way leads from [{x:g}, {z:g}] for a body of radius {radius}",
         )
     problems.raise_if_any()
