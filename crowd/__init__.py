@@ -7,7 +7,51 @@
 """
 
 import os
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 # Threads that wait for work by spinning would take the core of a viewer or of a second run.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
+if TYPE_CHECKING:
+    from crowd.errors import CrowdError
+    from crowd.metrics import Metrics, measure
+    from crowd.recording import Recorder, Recording
+    from crowd.scenario import Scenario, load_scenario
+    from crowd.simulation import Frame, Simulation
+    from crowd.compilation import warm_up
+
+__all__ = [
+    "CrowdError",
+    "Frame",
+    "Metrics",
+    "Recorder",
+    "Recording",
+    "Scenario",
+    "Simulation",
+    "load_scenario",
+    "measure",
+    "warm_up",
+]
+
+_HOME = {
+    "CrowdError": "errors",
+    "Frame": "simulation",
+    "Metrics": "metrics",
+    "Recorder": "recording",
+    "Recording": "recording",
+    "Scenario": "scenario",
+    "Simulation": "simulation",
+    "load_scenario": "scenario",
+    "measure": "metrics",
+    "warm_up": "compilation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used, so that `import crowd` stays light."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'crowd' has no attribute {name!r}")
+    value = getattr(import_module(f"crowd.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -69,6 +69,8 @@ class Simulation:
         Number of people, instead of the scenario's own.
     bodies : {"people", "discs"}
         ``"discs"`` moves plain discs by avoidance alone, without animation: the comparison for benchmarks.
+    is_threaded : bool, optional
+        Use the kernels' threaded builds; from 200 people on when left out. Results are the same.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class Simulation:
         motions: MotionLibrary | None = None,
         characters: int | None = None,
         bodies: Literal["people", "discs"] = "people",
+        is_threaded: bool | None = None,
     ) -> None:
         self.scenario = scenario
         self.seed = seed
@@ -88,7 +91,8 @@ class Simulation:
         self.step_index = 0
         self.model = Model.build(scenario, seed, motions, characters)
         capacity = self.model.capacity
-        self.threads = 1 if capacity < SERIAL_BELOW else thread_count(threads)
+        is_threaded = capacity >= SERIAL_BELOW if is_threaded is None else is_threaded
+        self.threads = thread_count(threads) if is_threaded else 1
         _jit.set_thread_count(self.threads)
         self.state = State.create(capacity)
         self.model.timetable.update(self.model.world, 0.0)
@@ -127,8 +131,8 @@ class Simulation:
         present = self.state.is_active
         return not self.population.expects_more() and bool(self.state.is_finished[present].all())
 
-    def step(self) -> Frame:
-        """Advance by one step of `dt`."""
+    def step(self, on_stage: Callable[[str], None] | None = None) -> Frame:
+        """Advance by one step of `dt`; `on_stage` is called with the name of each stage before it runs."""
         _jit.set_thread_count(self.threads)
         step = Step(
             self.model,
@@ -141,6 +145,8 @@ class Simulation:
         )
         frame = Frame(step.index, step.time, self)
         for stage in STAGES:
+            if on_stage is not None:
+                on_stage(stage)
             start = time.perf_counter()
             getattr(self, f"_{stage}")(step, frame)
             self.stage_seconds[stage] += time.perf_counter() - start

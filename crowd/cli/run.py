@@ -109,12 +109,14 @@ def _prepare(
     import crowd
 
     console = Console(stderr=True)
-    begin = time.perf_counter()
-    with console.status("compiling kernels (first run only)") as status:
-        crowd.warm_up(lambda text: status.update(f"compiling kernels (first run only): {text}"))
-        compile_seconds = time.perf_counter() - begin
-        status.update("placing people")
+    with console.status("placing people") as status:
         simulation = crowd.Simulation(scenario, seed=seed, threads=threads, characters=characters)
+        begin = time.perf_counter()
+        crowd.warm_up(
+            lambda stage: status.update(f"compiling kernels (first run only): {stage}"),
+            is_threaded=simulation.threads > 1,
+        )
+        compile_seconds = time.perf_counter() - begin
     return simulation, compile_seconds
 
 

@@ -41,6 +41,8 @@ class Navigator:
         self._responsibility = np.full(capacity, 0.5)
         self._stays_at_goal = ~model.placed.leaves_at_goal
         self._mobility = np.ones(capacity)
+        self.deepest_overlap = 0.0
+        """Deepest overlap that the last projection left, m."""
         self._maximum_speed = np.zeros(capacity)
         self._wanted_speed = np.zeros(capacity)
 
@@ -118,7 +120,7 @@ class Navigator:
     def project(self, step: Step) -> None:
         """Push overlapping bodies apart and out of walls; the realised velocity includes the push."""
         state = step.state
-        self.avoidance.project(
+        report = self.avoidance.project(
             state.position_world,
             state.previous_position_world,
             self.model.people.radius,
@@ -128,6 +130,7 @@ class Navigator:
             step.dt,
             seed=step.seed,
         )
+        self.deepest_overlap = report.deepest_overlap
         moved = state.position_world[step.active] - state.previous_position_world[step.active]
         state.velocity_world[step.active] = moved / step.dt
 

@@ -69,7 +69,7 @@ class World:
         """The walkable grid for a body radius, m."""
         step = radius_class(radius)
         if step not in self._grids:
-            self._grids[step] = Grid.build(self.layout, self._tree, step * RADIUS_STEP)
+            self._grids[step] = Grid.build(self.layout, self.tree, step * RADIUS_STEP)
         return self._grids[step]
 
     def clearance_at(self, points_world: FloatArray) -> FloatArray:
@@ -77,7 +77,7 @@ class World:
         points = np.ascontiguousarray(points_world[:, [0, 2]])
         distance = np.full(len(points), np.inf)
         if self._obstacles and len(points):
-            (asked, _), gap = self._tree.query_nearest(
+            (asked, _), gap = self.tree.query_nearest(
                 shapely.points(points), return_distance=True, all_matches=False
             )
             distance[asked] = gap
@@ -116,7 +116,7 @@ class World:
         outlines = b"".join(shape.outline().tobytes() + b";" for shape in self._obstacles.values())
         self.digest = np.frombuffer(hashlib.blake2s(outlines, digest_size=16).digest(), np.uint8)
         """Sixteen bytes that differ between different obstacles."""
-        self._tree = shapely.STRtree([shape.geometry() for shape in shapes])
+        self.tree = shapely.STRtree([shape.geometry() for shape in shapes])
         self._grids: dict[int, Grid] = {}
         self.walls = Walls.build(
             polygons=[shape.outline() for shape in shapes if not isinstance(shape, Wall)],
