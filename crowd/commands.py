@@ -50,7 +50,21 @@ class Commands:
             raise SettingsError(describe("set_goal", "goal must be finite", allowed="numbers in metres"))
         if not radius > 0:
             raise SettingsError(describe("set_goal", "radius must be positive", radius, "> 0 m"))
-        self._simulation.send(rows, np.ascontiguousarray(goals), radius)
+        simulation = self._simulation
+        world, body = simulation.model.world, simulation.model.radius
+        for row, goal in zip(rows, goals, strict=True):
+            place = np.array([goal])
+            if not world.is_walkable(place, body[row])[0]:
+                where = "outside the bounds" if not world.is_inside_bounds(place)[0] else "inside an obstacle"
+                raise SettingsError(
+                    describe("set_goal", f"goal of character {row} is {where}", goal[[0, 2]].tolist())
+                )
+            start = simulation.state.position_world[row : row + 1]
+            if not world.is_reachable(start, place, body[row])[0]:
+                raise SettingsError(
+                    describe("set_goal", f"character {row} finds no way to its goal", goal[[0, 2]].tolist())
+                )
+        simulation.population.send(simulation.state, rows, np.ascontiguousarray(goals), radius)
 
     def set_locomotion(self, characters: Characters, parameters: npt.ArrayLike) -> None:
         """Command forward speed, turn rate and side speed directly; steering is ignored until `release`.

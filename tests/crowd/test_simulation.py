@@ -1,0 +1,241 @@
+"""Whole runs: repeatable bits, stop and go on, people who walk where they should, obstacles that come and go."""
+
+import numpy as np
+import pytest
+
+import crowd
+from crowd.errors import CrowdError, MotionError, RecordingError, SettingsError
+from crowd.scenario.schema import Area, Box, Character, Flow, Goal, Region, Scenario, Wall, WorldTable
+
+GROUND = WorldTable(bounds=Area(x=(-20, 20), z=(-20, 20)))
+
+
+def busy(count=60):
+    """People who cross a small square with a wall and a box, some standing, all the time."""
+    square = Area(x=(-9, 9), z=(-9, 9))
+    return Scenario(
+        name="busy",
+        world=WorldTable(
+            bounds=Area(x=(-12, 12), z=(-12, 12)),
+            boxes=(Box(x=(-2, 2), z=(-1, 1)), Box(x=(4, 5), z=(-6, -2), appear_at=0.8, disappear_at=1.6)),
+            walls=(Wall(points=((-6, 3), (-3, 5))),),
+        ),
+        regions=(
+            Region(count=count, area=square, goals=(Goal(area=square, radius=0.6),), repeat=True),
+            Region(count=8, area=square, gestures=("wave",), gesture_every=2.0),
+        ),
+        flows=(
+            Flow(
+                source=Area(x=(-11, -9), z=(-11, -9)),
+                rate=2.0,
+                most_present=6,
+                goals=(Goal(position=(10, 10)),),
+            ),
+        ),
+    )
+
+
+def arrays_of(simulation):
+    from crowd.checkpoint import state_arrays
+
+    return {name: array.copy() for name, array in state_arrays(simulation)}
+
+
+def assert_equal_bits(one, other):
+    for name, array in one.items():
+        np.testing.assert_array_equal(array, other[name], err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """State of the busy scene after two seconds on one thread."""
+    simulation = crowd.Simulation(busy(), seed=5, is_threaded=False)
+    for _ in simulation.run(seconds=2.0):
+        pass
+    return arrays_of(simulation)
+
+
+def test_equal_bits_on_two_threads(reference):
+    simulation = crowd.Simulation(busy(), seed=5, threads=2, is_threaded=True)
+    for _ in simulation.run(seconds=2.0):
+        pass
+    assert_equal_bits(reference, arrays_of(simulation))
+
+
+@pytest.mark.parametrize("stop", [0.5, 1.2])
+def test_equal_bits_after_stop_save_and_restore(reference, stop, tmp_path):
+    first = crowd.Simulation(busy(), seed=5, is_threaded=False)
+    for _ in first.run(seconds=stop):
+        pass
+    first.save(tmp_path / "stop.npz")
+    second = crowd.Simulation(busy(), seed=5, is_threaded=False)
+    second.restore(tmp_path / "stop.npz")
+    assert second.time == pytest.approx(stop)
+    for _ in second.run(seconds=2.0 - stop):
+        pass
+    assert_equal_bits(reference, arrays_of(second))
+
+
+def test_another_seed_gives_another_run(reference):
+    simulation = crowd.Simulation(busy(), seed=6, is_threaded=False)
+    for _ in simulation.run(seconds=0.5):
+        pass
+    assert (simulation.state.position_world != reference["state.position_world"]).any()
+
+
+def test_a_checkpoint_of_another_run_is_refused(tmp_path):
+    simulation = crowd.Simulation(busy(), seed=5)
+    simulation.save(tmp_path / "stop.npz")
+    with pytest.raises(RecordingError, match="seed"):
+        crowd.Simulation(busy(), seed=6).restore(tmp_path / "stop.npz")
+    (tmp_path / "broken.npz").write_bytes(b"nothing")
+    with pytest.raises(RecordingError, match="not a checkpoint"):
+        simulation.restore(tmp_path / "broken.npz")
+    with pytest.raises(RecordingError, match="cannot write"):
+        simulation.save(tmp_path / "nowhere" / "stop.npz")
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def walker(**changes):
+    return Character(**({"position": (0, -5), "facing": 0, "goals": (Goal(position=(0, 5)),)} | changes))
+
+
+def run_one(person, seconds, world=GROUND, **options):
+    simulation = crowd.Simulation(Scenario(world=world, characters=(person,)), **options)
+    for _ in simulation.run(seconds=seconds):
+        pass
+    return simulation
+
+
+def test_a_walker_reaches_its_goal_at_its_speed_and_stays():
+    simulation = run_one(walker(speed=1.4), 6.0)
+    assert simulation.state.locomotion_parameter[0, 0] == pytest.approx(1.4, abs=0.01)
+    for _ in simulation.run(seconds=5.0):
+        pass
+    assert simulation.is_finished
+    assert np.linalg.norm(simulation.state.position_world[0] - (0, 0, 5)) < 0.45
+    assert simulation.state.locomotion_weight[0] == 0.0, "it stands again"
+
+
+def test_a_walker_with_its_goal_behind_turns_before_it_walks():
+    simulation = run_one(walker(facing=180.0), 0.6)
+    assert abs(simulation.state.yaw[0]) < np.pi - 0.3
+    assert np.linalg.norm(simulation.state.position_world[0] - (0, 0, -5)) < 0.3
+    for _ in simulation.run(seconds=10.0):
+        pass
+    assert simulation.is_finished
+
+
+def test_leaving_people_are_gone():
+    simulation = run_one(walker(on_arrival="leave"), 12.0)
+    assert not simulation.state.is_active[0]
+    assert simulation.is_finished
+
+
+def test_goals_are_done_in_order_with_waits():
+    person = walker(goals=(Goal(position=(0, -2), wait_seconds=2.0), Goal(position=(2, -2))))
+    simulation = run_one(person, 4.5)
+    assert simulation.state.goal_index[0] == 1
+    assert not simulation.state.wants_to_walk[0]
+    for _ in simulation.run(seconds=6.0):
+        pass
+    assert simulation.is_finished
+
+
+def test_an_obstacle_that_appears_is_walked_around_and_one_that_goes_opens_the_way():
+    wall = Box(x=(-20, 3), z=(0, 0.5), appear_at=1.0)
+    simulation = run_one(walker(), 25.0, WorldTable(bounds=GROUND.bounds, boxes=(wall,)))
+    assert simulation.is_finished
+    door = Box(x=(-20, 20), z=(0, 0.5), disappear_at=4.0)
+    simulation = crowd.Simulation(
+        Scenario(world=WorldTable(bounds=GROUND.bounds, boxes=(door,)), characters=(walker(),))
+    )
+    for frame in simulation.run(seconds=4.0):
+        assert simulation.state.position_world[0, 2] < 0.0, frame.time
+    for _ in simulation.run(seconds=12.0):
+        pass
+    assert simulation.is_finished
+
+
+def test_two_who_meet_pass_each_other():
+    people = (walker(), walker(position=(0, 5), facing=180.0, goals=(Goal(position=(0, -5)),)))
+    simulation = crowd.Simulation(Scenario(world=GROUND, characters=people))
+    nearest = np.inf
+    for _ in simulation.run(seconds=12.0):
+        nearest = min(nearest, np.linalg.norm(np.subtract(*simulation.state.position_world)))
+    assert simulation.is_finished
+    assert nearest > 0.45
+
+
+def test_a_flow_brings_people_in_at_its_rate_and_takes_them_out():
+    flow = Flow(
+        source=Area(x=(-2, 2), z=(-6, -4)),
+        rate=1.0,
+        limit=5,
+        most_present=3,
+        goals=(Goal(position=(0, 1)),),
+        speed=1.5,
+    )
+    simulation = crowd.Simulation(Scenario(world=GROUND, flows=(flow,)))
+    present = [int(simulation.state.is_active.sum()) for _ in simulation.run(seconds=25.0)]
+    assert max(present) <= 3
+    assert simulation.state.spawn_count.sum() == 5
+    assert present[-1] == 0
+    assert simulation.is_finished
+
+
+def test_discs_move_without_animation():
+    simulation = run_one(walker(), 12.0, bodies="discs")
+    assert simulation.is_finished
+    assert simulation.state.locomotion_weight[0] == 0.0
+
+
+def test_commands_change_what_people_do():
+    simulation = crowd.Simulation(Scenario(world=GROUND, characters=(Character(position=(0, 0), facing=0),)))
+    simulation.commands.set_locomotion(0, (1.0, 0.0, 0.0))
+    for _ in simulation.run(seconds=3.0):
+        pass
+    assert 2.0 < simulation.state.position_world[0, 2] < 3.0
+    simulation.commands.release(0)
+    simulation.commands.set_goal(0, (0.0, 0.0))
+    for _ in simulation.run(seconds=8.0):
+        pass
+    assert simulation.is_finished
+    assert np.linalg.norm(simulation.state.position_world[0]) < 0.5
+    hand = simulation.model.skeleton.joint("right_hand")
+    simulation.commands.play(0, "wave")
+    highest = max(simulation.joint_positions_world()[0, hand, 1] for _ in simulation.run(seconds=2.5))
+    assert highest > 1.3, "a hand that waves is up"
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda c: c.play(0, "wav"), MotionError, "wave"),
+        (lambda c: c.play(0, "wave", seconds=-1), SettingsError, "positive"),
+        (lambda c: c.set_goal(0, (np.nan, 0)), SettingsError, "finite"),
+        (lambda c: c.set_goal(7, (0, 0)), SettingsError, "no such row"),
+        (lambda c: c.set_goal(0, (100, 0)), SettingsError, "outside"),
+        (lambda c: c.set_goal(0, (0, 0), radius=0), SettingsError, "positive"),
+        (lambda c: c.set_locomotion(0, (np.inf, 0, 0)), SettingsError, "finite"),
+    ],
+)
+def test_bad_commands_get_one_clear_line(call, error, message):
+    simulation = crowd.Simulation(Scenario(world=GROUND, characters=(walker(),)))
+    with pytest.raises(error, match=message) as caught:
+        call(simulation.commands)
+    assert isinstance(caught.value, CrowdError)
+    assert "\n" not in str(caught.value)
+
+
+def test_joints_hang_together_and_rotations_are_unit():
+    simulation = run_one(walker(), 2.0)
+    skeleton = simulation.model.skeleton
+    position = simulation.joint_positions_world()[0]
+    scale = simulation.model.people.segment_scale[0, skeleton.segment]
+    for joint in range(1, skeleton.joint_count):
+        length = np.linalg.norm(position[joint] - position[skeleton.parent[joint]])
+        assert length == pytest.approx(np.linalg.norm(skeleton.offset[joint]) * scale[joint], abs=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(simulation.joint_rotations_local()[0], axis=1), 1, atol=1e-5)
+    assert position[skeleton.joint("head"), 1] > 1.3
+    assert abs(position[:, 1].min()) < 0.06
