@@ -24,6 +24,7 @@ METRIC_KEYS = (
     "overlap.max_depth_m",
     "overlap.p99_depth_m",
     "wall.max_depth_m",
+    "wall.crossings",
     "foot_slip.mean_m",
     "foot_slip.p95_m",
     "foot_slip.max_m",

@@ -231,7 +231,7 @@ def test_every_bundled_scenario_is_complete() -> None:
         scenario = load_scenario(name)
         assert scenario.name == name
         assert scenario.description
-        assert {"overlap.max_depth_m", "wall.max_depth_m", "foot_slip.mean_m"} <= set(scenario.expect)
+        assert {"overlap.max_depth_m", "foot_slip.mean_m"} <= set(scenario.expect)
         people = place(scenario, seed=1)
         assert people.count == scenario.character_count
         assert people.radius.min() >= 0.22
