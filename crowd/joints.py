@@ -31,12 +31,16 @@ class Joints:
 
     def compute(self, state: State, people: People, active: IntArray) -> None:
         """Compute the joints of active people from their pose."""
+        self.compute_arrays(state, people.segment_scale, active)
+
+    def compute_arrays(self, state: State, segment_scale: Float32Array, active: IntArray) -> None:
+        """Compute joints for given proportions, (N, 8)."""
         kinematics(
             self._parent,
             self._offset,
             self._segment,
             int(Segment.LEG),
-            people.segment_scale,
+            segment_scale,
             state.pose_rotation,
             state.pose_pelvis,
             active,

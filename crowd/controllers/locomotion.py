@@ -6,11 +6,16 @@ from typing import ClassVar
 import numpy as np
 
 from crowd.controllers.controller import IntArray, KeySamples, Step
-from crowd.state import State
+from crowd.state import FloatArray, State
 from crowd_kernels.barycentric import locate_crowd
 from crowd_kernels.gait import contact_crowd, sample_crowd
-from crowd_kernels.locomotion import CommandLimits, GaitLimits, command_crowd, gait_crowd
-
+from crowd_kernels.locomotion import (
+    CommandLimits,
+    GaitLimits,
+    approach_crowd,
+    gait_crowd,
+    wish_crowd,
+)
 
 COMMAND_LIMITS = CommandLimits(
     heading_time=0.35,
@@ -57,6 +62,7 @@ class Locomotion:
         self.wanted_parameter = np.zeros((capacity, 3))
         self.contact_wanted = np.zeros((capacity, 2), np.uint8)
         """Contact of each foot as the layers want it, before foot locking. (character, 2)"""
+        self._library_wish = np.zeros((capacity, 3))
         self._library_parameter = np.zeros((capacity, 3))
         self._is_inside = np.zeros(capacity, np.uint8)
         self._samples = KeySamples.create(capacity, 4)
@@ -70,7 +76,7 @@ class Locomotion:
     def command(self, step: Step) -> None:
         """Turn desired velocities into parameters inside the hull, and advance gait state and phase."""
         state, people = step.state, step.model.people
-        command_crowd(
+        wish_crowd(
             state.yaw,
             state.position_world,
             state.way_point_world,
@@ -85,20 +91,21 @@ class Locomotion:
             step.dt,
             state.heading_velocity_world,
             state.turning_side,
-            state.locomotion_parameter,
             self.wanted_parameter,
             self._library_parameter,
         )
-        locate_crowd(
-            step.model.space.arrays,
-            self._library_parameter,
+        self._locate(step, self._library_wish)
+        approach_crowd(
+            self._library_wish,
+            people.stride_scale,
+            people.tempo,
             step.active,
-            state.example,
-            state.example_weight,
-            state.cycle_rate,
-            state.library_parameter,
-            self._is_inside,
+            self.settings.command,
+            step.dt,
+            state.locomotion_parameter,
+            self._library_parameter,
         )
+        self._locate(step, state.library_parameter)
         gait_crowd(
             self.wanted_parameter,
             state.locomotion_parameter,
@@ -111,6 +118,20 @@ class Locomotion:
             state.locomotion_weight,
             state.locomotion_weight_rate,
             state.phase,
+        )
+
+    def _locate(self, step: Step, out_library_parameter: FloatArray) -> None:
+        """Bring `_library_parameter` inside the hull, and find the examples to blend."""
+        state = step.state
+        locate_crowd(
+            step.model.space.arrays,
+            self._library_parameter,
+            step.active,
+            state.example,
+            state.example_weight,
+            state.cycle_rate,
+            out_library_parameter,
+            self._is_inside,
         )
 
     def evaluate(self, step: Step) -> None:

@@ -253,7 +253,7 @@ def wanted_turn_rate(
 
 
 @parallel_kernel
-def command_crowd(
+def wish_crowd(
     yaw: Any,
     position_world: Any,
     way_point_world: Any,
@@ -268,11 +268,10 @@ def command_crowd(
     dt: float,
     heading_velocity_world: Any,
     turning_side: Any,
-    locomotion_parameter: Any,
     out_wanted_parameter: Any,
     out_library_parameter: Any,
 ) -> None:
-    """Turn desired velocities into locomotion parameters that change no faster than people can.
+    """Express desired velocities as locomotion parameters: what characters wish, within reach or not.
 
     Parameters
     ----------
@@ -301,19 +300,16 @@ def command_crowd(
         In and out: smoothed desired velocity, m/s.
     turning_side : (N,) int8
         In and out, see `wanted_turn_rate`.
-    locomotion_parameter : (N, 3) float64
-        In and out: forward speed m/s, turn rate rad/s, side speed m/s.
     out_wanted_parameter : (N, 3) float64
-        What the desired velocity asks for, without limits.
+        Forward speed m/s, turn rate rad/s, side speed m/s.
     out_library_parameter : (N, 3) float64
-        `locomotion_parameter` as the motion library knows it: speeds over `stride_scale` and `tempo`, turn
-        rate over `tempo`.
+        The same as the motion library knows it: speeds over `stride_scale` and `tempo`, turn over `tempo`.
 
     Notes
     -----
-    **Source:** the weakness stated by Feng, Xu, Shapiro, section 4.2, that steering asks for motion which the
-    animation cannot do; limits after Glardon et al. (0.7 m/s^2 in steady walking).
-    **Differs from the source:** neither paper limits the command before it is blended.
+    **Source:** Feng, Xu, Shapiro, section 4.2: steering drives the parameters of locomotion.
+    **Differs from the source:** the body turns to a smoothed velocity while the feet follow the present one,
+    sideways if need be.
     """
     count = active.shape[0]
     smoothing = min(dt / limits.heading_time, 1.0)
@@ -347,6 +343,56 @@ def command_crowd(
             out_wanted_parameter[character, 0] = forward
             out_wanted_parameter[character, 1] = turn
             out_wanted_parameter[character, 2] = side
+            speed_scale = stride_scale[character] * tempo[character]
+            out_library_parameter[character, 0] = forward / speed_scale
+            out_library_parameter[character, 1] = turn / tempo[character]
+            out_library_parameter[character, 2] = side / speed_scale
+
+
+@parallel_kernel
+def approach_crowd(
+    library_wish: Any,
+    stride_scale: Any,
+    tempo: Any,
+    active: Any,
+    limits: CommandLimits,
+    dt: float,
+    locomotion_parameter: Any,
+    out_library_parameter: Any,
+) -> None:
+    """Move locomotion parameters towards what is wished, no faster than people can.
+
+    Parameters
+    ----------
+    library_wish : (N, 3) float64
+        Wished parameters inside the locomotion hull, as the motion library knows them.
+    stride_scale, tempo : (N,) float64
+        See `wish_crowd`.
+    active : (A,) int32
+        Characters to process.
+    limits : CommandLimits
+    dt : float
+        s.
+    locomotion_parameter : (N, 3) float64
+        In and out: forward speed m/s, turn rate rad/s, side speed m/s.
+    out_library_parameter : (N, 3) float64
+        The new parameters as the motion library knows them.
+
+    Notes
+    -----
+    **Source:** the weakness stated by Feng, Xu, Shapiro, section 4.2, that steering asks for motion which the
+    animation cannot do; limits after Glardon et al. (0.7 m/s^2 in steady walking).
+    **Differs from the source:** neither paper limits the command before it is blended.
+    """
+    count = active.shape[0]
+    for k in prange(CHUNKS):
+        chunk = (k * 37) % CHUNKS
+        for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            character = active[index]
+            speed_scale = stride_scale[character] * tempo[character]
+            forward = library_wish[character, 0] * speed_scale
+            turn = library_wish[character, 1] * tempo[character]
+            side = library_wish[character, 2] * speed_scale
             now = locomotion_parameter[character, 0]
             slows = abs(forward) < abs(now) or forward * now < 0.0
             acceleration = limits.braking if slows else limits.forward_acceleration
@@ -356,7 +402,6 @@ def command_crowd(
             locomotion_parameter[character, 0] = forward
             locomotion_parameter[character, 1] = turn
             locomotion_parameter[character, 2] = side
-            speed_scale = stride_scale[character] * tempo[character]
             out_library_parameter[character, 0] = forward / speed_scale
             out_library_parameter[character, 1] = turn / tempo[character]
             out_library_parameter[character, 2] = side / speed_scale

@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 from crowd_kernels.locomotion import (
     CommandLimits,
     GaitLimits,
-    command_crowd,
+    approach_crowd,
     ease,
     gait_crowd,
     integrate_root_crowd,
     prefer_crowd,
+    wish_crowd,
     wrapped_angle,
 )
 from tests.oracles import locomotion as oracle
@@ -36,7 +37,7 @@ def everyone(count=COUNT):
 
 
 def command(rng, count=COUNT, **changes):
-    """Run `command_crowd` on random characters and return all its arrays by name."""
+    """Run `wish_crowd` and `approach_crowd` on random characters and return all its arrays by name."""
     arrays = {
         "yaw": rng.uniform(-math.pi, math.pi, count),
         "position_world": ground_vectors(rng, count),
@@ -56,7 +57,17 @@ def command(rng, count=COUNT, **changes):
         "out_wanted_parameter": np.zeros((count, 3)),
         "out_library_parameter": np.zeros((count, 3)),
     } | changes
-    command_crowd(*arrays.values())
+    wish_crowd(*(array for name, array in arrays.items() if name != "locomotion_parameter"))
+    approach_crowd(
+        arrays["out_library_parameter"].copy(),
+        arrays["stride_scale"],
+        arrays["tempo"],
+        arrays["active"],
+        arrays["limits"],
+        arrays["dt"],
+        arrays["locomotion_parameter"],
+        arrays["out_library_parameter"],
+    )
     return arrays
 
 

@@ -1,0 +1,62 @@
+"""Frame rate against number of characters, drawn as in the paper, with the paper's own figures in it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crowd.errors import SettingsError, describe
+
+# Feng, Xu, Shapiro, table 2, milliseconds per character and update. The paper prints figure 7 without
+# numbers; frames per second follow from the table as 1000 / (characters * milliseconds).
+PAPER_LOCOMOTION_MS = 0.21
+PAPER_STEERING_MS = 0.70
+PAPER_TOTAL_MS = 1.68
+PAPER_CHARACTERS = 20
+"""Number of characters up to which the paper states real-time performance."""
+
+
+def draw(rows: Sequence[Mapping[str, Any]], machine: Mapping[str, Any], path: Path) -> None:
+    """Draw results to a picture file.
+
+    Raises
+    ------
+    SettingsError
+        matplotlib is not installed, or the file cannot be written.
+    """
+    try:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise SettingsError(
+            describe("--plot", "needs matplotlib", allowed='pip install "crowd-engine[bench]"')
+        ) from error
+    figure, axes = plt.subplots(figsize=(7.5, 5.0), layout="constrained")
+    for case in dict.fromkeys(row["case"] for row in rows):
+        points = sorted((row["characters"], row["fps"]) for row in rows if row["case"] == case)
+        axes.plot(*zip(*points, strict=True), marker="o", label=case.replace("_", " "))
+    count = np.geomspace(1, 10_000, 50)
+    for milliseconds, what in (
+        (PAPER_LOCOMOTION_MS + PAPER_STEERING_MS, "locomotion and steering"),
+        (PAPER_TOTAL_MS, "everything"),
+    ):
+        axes.plot(count, 1000.0 / (count * milliseconds), "--", lw=1, label=f"Feng et al., {what}")
+    axes.plot(
+        [PAPER_CHARACTERS], [1000.0 / (PAPER_CHARACTERS * PAPER_TOTAL_MS)], "kx", label='"over 20 characters"'
+    )
+    axes.axhline(60.0, color="0.6", lw=0.8)
+    axes.set(xscale="log", yscale="log", xlabel="characters", ylabel="frames per second", ylim=(5, None))
+    axes.set_title(
+        f"{machine['processor']}, {rows[0]['threads']} threads or fewer, {machine['date']}", fontsize=9
+    )
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    try:
+        figure.savefig(path, dpi=110)
+    except (OSError, ValueError) as error:
+        raise SettingsError(describe(str(path), "cannot be drawn", str(error))) from error
+    finally:
+        plt.close(figure)
