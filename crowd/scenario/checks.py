@@ -17,6 +17,9 @@ METRIC_KEYS = (
     "characters",
     "seconds",
     "frames",
+    "dt",
+    "seed",
+    "threads",
     "wall_seconds",
     "compile_seconds",
     "real_time_factor",
@@ -31,6 +34,7 @@ METRIC_KEYS = (
     "foot_slip.stances",
     "locomotion.speed_rms_relative",
     "locomotion.turn_rms_deg_s",
+    "locomotion.windows",
 )
 """Metrics that a run reports and a scenario may bound."""
 
