@@ -117,3 +117,18 @@ def test_the_first_ctrl_c_asks_and_the_second_stops() -> None:
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_benchmarks_are_part_of_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["bench", "--help"]) == 0
+    assert "--compare" in capsys.readouterr().out
+    assert exit_code(["bench", "--scenes", "nowhere"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "'nowhere'" in line
+
+
+def test_help_names_every_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["run", "--help"]) == 0
+    text = capsys.readouterr().out
+    options = "characters seconds seed motions view video picture record metrics threads check"
+    assert all(f"--{option}" in text for option in options.split())
