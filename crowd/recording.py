@@ -1,294 +1,26 @@
-"""Recordings: what happened in a run, streamed to an HDF5 file that stays readable when the run is killed.
-
-The file is written in HDF5's single-writer mode: at any moment it holds whole blocks of frames and may be
-read while the run goes on. Rotations are stored as 16-bit numbers, right to 0.0001 rad.
-"""
+"""Recordings: what happened in a run, as `crowd.recorder` wrote it."""
 
 from __future__ import annotations
 
-import errno
-import math
 import os
-import shutil
-import time as clock
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass
-from importlib import metadata
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
 import numpy.typing as npt
 
-from crowd.errors import RecordingError, SettingsError, describe
+from crowd.errors import RecordingError, describe
 from crowd.motion.skeleton import Skeleton
-from crowd.scenario.geometry import wall_segments
+from crowd.recorder import FORMAT, PELVIS, ROTATION, STATE_FIELDS, Field, Recorder, reason
 
-if TYPE_CHECKING:
-    from crowd.simulation import Frame, Simulation
+__all__ = ["STATE_FIELDS", "Field", "Recorder", "Recording"]
 
 FloatArray = npt.NDArray[np.float64]
 AnyArray = npt.NDArray[Any]
 Rows = int | slice
-
-FORMAT = 1
-ROTATION_STEPS = 32767.0
-BLOCK_SECONDS = 1.0
-BLOCK_BYTES = 16 << 20
-CHUNK_BYTES = 1 << 20
-LARGEST_DELAY = 1.0
-"""Wall time after which frames are written although the block is not full, s."""
-TABLE_BYTES = 1 << 20
-"""Room reserved for the file's own tables."""
-
-
-@dataclass(frozen=True)
-class Field:
-    """One recorded quantity: how a frame of it is stored, and how it is documented in the file."""
-
-    dtype: Any
-    shape: tuple[int, ...]
-    meaning: str
-
-
-STATE_FIELDS: Mapping[str, Field] = {
-    "is_active": Field(np.bool_, (), "in the scene"),
-    "is_finished": Field(np.bool_, (), "has completed the goal list"),
-    "spawn_count": Field(np.int32, (), "people that have entered through the slot so far"),
-    "position_world": Field(np.float64, (3,), "root on the ground, m"),
-    "yaw": Field(np.float64, (), "heading about +y, 0 faces +z, left positive, rad"),
-    "velocity_world": Field(np.float32, (3,), "realised velocity of the root, m/s"),
-    "goal_world": Field(np.float32, (3,), "present goal, m"),
-    "wants_to_walk": Field(np.bool_, (), "has a goal and is not waiting"),
-    "locomotion_parameter": Field(np.float32, (3,), "forward m/s, turn rad/s, side m/s of the present blend"),
-    "directed_parameter": Field(np.float32, (3,), "commanded forward m/s, turn rad/s, side m/s"),
-    "is_directed": Field(np.bool_, (), "moves by command instead of steering"),
-    "desired_velocity_world": Field(np.float32, (3,), "velocity that avoidance asks for, m/s"),
-    "locomotion_weight": Field(np.float32, (), "share of locomotion in the pose, 0 to 1"),
-    "phase": Field(np.float32, (), "gait phase, cycles"),
-    "foot_contact": Field(np.uint8, (2,), "right, left: 0 swing, 1 heel, 2 ball"),
-    "foot_point_world": Field(np.float32, (2, 2, 3), "right, left; heel, ball; m"),
-}
-ROTATION = "rotation_local"
-PELVIS = "pelvis_root"
-
-
-class Recorder:
-    """Writes frames of a simulation to a new file.
-
-    Parameters
-    ----------
-    path : path
-        Usually ends in ``.h5``; an existing file is replaced.
-    simulation : Simulation
-    every : int
-        Record each `every`-th step, >= 1. At 60 Hz, 2 gives 30 frames a second.
-
-    Raises
-    ------
-    RecordingError
-        The file cannot be written.
-    """
-
-    def __init__(self, path: str | os.PathLike[str], simulation: Simulation, every: int = 2) -> None:
-        if every < 1:
-            raise SettingsError(describe("every", "must be positive", every, "1 or more"))
-        self.path = Path(path)
-        self.every = every
-        self.frame_count = 0
-        self._fields = _fields_of(simulation)
-        self._pending = 0
-        self._written_at = clock.monotonic()
-        frame_bytes = sum(
-            np.dtype(field.dtype).itemsize * math.prod(field.shape) for field in self._fields.values()
-        )
-        capacity = simulation.state.capacity
-        per_second = max(1, round(BLOCK_SECONDS / (simulation.dt * every)))
-        self._block = max(1, min(per_second, BLOCK_BYTES // max(1, frame_bytes * capacity)))
-        self._buffers = {
-            name: np.zeros((self._block, capacity, *field.shape), field.dtype)
-            for name, field in self._fields.items()
-        }
-        self._times = np.zeros(self._block)
-        self._block_bytes = self._times.nbytes + sum(buffer.nbytes for buffer in self._buffers.values())
-        # Kept open: HDF5 writes what it holds of a dataset when the last reference to it goes.
-        self._datasets: dict[str, h5py.Dataset] = {}
-        self._file: h5py.File | None = None
-        try:
-            self._file = h5py.File(self.path, "w", libver="latest")
-            self._write_facts(simulation)
-            self._create_frames(capacity)
-            self._file.swmr_mode = True
-            self._reserve()
-        except (OSError, RuntimeError) as error:
-            if self._file is not None:
-                self._abandon()
-                self.path.unlink()
-            raise RecordingError(describe(str(self.path), "cannot be written", _reason(error))) from error
-
-    def record(self, frame: Frame) -> None:
-        """Note a frame if its turn has come, and write what has gathered.
-
-        Raises
-        ------
-        RecordingError
-            The disk is full; the file keeps all frames written before and is closed.
-        """
-        if (frame.index + 1) % self.every or self._file is None:
-            return
-        simulation, row = frame.simulation, self._pending
-        state = simulation.state
-        for name, buffer in self._buffers.items():
-            if name == ROTATION:
-                buffer[row] = np.rint(simulation.joint_rotations_local() * ROTATION_STEPS)
-            elif name == PELVIS:
-                buffer[row] = simulation.pelvis_positions_root()
-            else:
-                buffer[row] = getattr(state, name)
-        self._times[row] = frame.time
-        self._pending += 1
-        if self._pending == self._block or clock.monotonic() - self._written_at > LARGEST_DELAY:
-            self._write()
-
-    def close(self) -> None:
-        """Write what is left and close the file; further calls do nothing.
-
-        Raises
-        ------
-        RecordingError
-            The disk is full; the file keeps all frames written before.
-        """
-        if self._file is None:
-            return
-        self._write()
-        os.ftruncate(self._descriptor, self._file.id.get_filesize())
-        file, self._file = self._file, None
-        self._datasets.clear()
-        try:
-            file.close()
-        except (OSError, RuntimeError) as error:
-            raise RecordingError(self._cut_off(error)) from error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _write(self) -> None:
-        """Append the gathered frames. The time column comes last: what it holds is complete."""
-        if self._file is None or self._pending == 0:
-            return
-        first, last = self.frame_count, self.frame_count + self._pending
-        try:
-            self._reserve()
-            for name, buffer in self._buffers.items():
-                dataset = self._datasets[name]
-                dataset.resize(last, axis=0)
-                dataset[first:last] = buffer[: self._pending]
-            self._file.flush()
-            times = self._datasets["time"]
-            times.resize(last, axis=0)
-            times[first:last] = self._times[: self._pending]
-            self._file.flush()
-        except (OSError, RuntimeError) as error:
-            message = self._cut_off(error)
-            self._abandon()
-            raise RecordingError(message) from error
-        self.frame_count = last
-        self._pending = 0
-        self._written_at = clock.monotonic()
-
-    def _cut_off(self, error: Exception) -> str:
-        what = f"cannot be written any further; the first {self.frame_count} frames are kept"
-        return describe(str(self.path), what, _reason(error))
-
-    def _reserve(self) -> None:
-        """Take the room for the next block first: the HDF5 library does not survive a failed write."""
-        assert self._file is not None
-        # A block may begin in one chunk of each quantity and end in the next.
-        wanted = 2 * self._block_bytes + TABLE_BYTES
-        if hasattr(os, "posix_fallocate"):
-            os.posix_fallocate(self._descriptor, self._file.id.get_filesize(), wanted)
-        elif shutil.disk_usage(self.path.absolute().parent).free < wanted:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    def _abandon(self) -> None:
-        """Close without another write to the disk, which keeps the file as the last whole block left it."""
-        if self._file is None:
-            return
-        self._pending = 0
-        if hasattr(os, "memfd_create"):
-            nowhere = os.memfd_create("abandoned recording")
-            os.dup2(nowhere, self._descriptor)
-            os.close(nowhere)
-        file, self._file = self._file, None
-        self._datasets.clear()
-        # The error that led here is the one to report.
-        with suppress(OSError, RuntimeError):
-            file.close()
-
-    @property
-    def _descriptor(self) -> int:
-        assert self._file is not None
-        return int(self._file.id.get_vfd_handle())
-
-    def _write_facts(self, simulation: Simulation) -> None:
-        """Write what stays the same during a run."""
-        assert self._file is not None
-        file, scenario, model = self._file, simulation.scenario, simulation.model
-        file.attrs["format"] = FORMAT
-        file.attrs["producer"] = "crowd-engine"
-        file.attrs["version"] = _version()
-        file.attrs["scenario"] = scenario.name
-        file.attrs["seed"] = simulation.seed
-        file.attrs["dt"] = simulation.dt
-        file.attrs["every"] = self.every
-        file.attrs["fps"] = 1.0 / (simulation.dt * self.every)
-        file.attrs["bodies"] = simulation.bodies
-        text = h5py.string_dtype("utf-8")
-        file.create_dataset(
-            "scenario_text", data=scenario.source.text or scenario.model_dump_json(), dtype=text
-        )
-        skeleton = model.skeleton
-        group = file.create_group("skeleton")
-        group.create_dataset("joint_names", data=list(skeleton.joint_names), dtype=text)
-        for name in ("parent", "offset", "segment", "limit_lower", "limit_upper"):
-            group.create_dataset(name, data=getattr(skeleton, name))
-        group.attrs["stature"] = skeleton.stature
-        people = file.create_group("characters")
-        people.create_dataset("name", data=list(model.placed.name), dtype=text)
-        for name in ("radius", "preferred_speed", "stature", "segment_scale"):
-            people.create_dataset(name, data=getattr(model.people, name))
-        world = file.create_group("world")
-        for name, values in wall_segments(scenario.world).items():
-            world.create_dataset(name, data=values)
-
-    def _create_frames(self, capacity: int) -> None:
-        assert self._file is not None
-        frames = self._file.create_group("frames")
-        for name, field in self._fields.items():
-            row_bytes = np.dtype(field.dtype).itemsize * math.prod(field.shape)
-            rows = min(capacity, max(1, CHUNK_BYTES // (row_bytes * self._block)))
-            dataset = frames.create_dataset(
-                name,
-                shape=(0, capacity, *field.shape),
-                maxshape=(None, capacity, *field.shape),
-                dtype=field.dtype,
-                chunks=(self._block, rows, *field.shape),
-                compression="lzf",
-                shuffle=True,
-            )
-            dataset.attrs["meaning"] = field.meaning
-            self._datasets[name] = dataset
-        self._datasets["time"] = frames.create_dataset(
-            "time", shape=(0,), maxshape=(None,), dtype=np.float64, chunks=(1024,), fillvalue=np.nan
-        )
 
 
 class Recording:
@@ -311,12 +43,12 @@ class Recording:
             self._file = h5py.File(self.path, "r", libver="latest", swmr=True)
         except (OSError, RuntimeError) as error:
             what = "is not a recording" if self.path.is_file() else "no such recording"
-            raise RecordingError(describe(str(self.path), what, _reason(error))) from error
+            raise RecordingError(describe(str(self.path), what, reason(error))) from error
         try:
             self._read_facts()
         except (KeyError, ValueError, OSError, RuntimeError) as error:
             self._file.close()
-            raise RecordingError(describe(str(self.path), "is not a recording", _reason(error))) from error
+            raise RecordingError(describe(str(self.path), "is not a recording", reason(error))) from error
 
     def _read_facts(self) -> None:
         file = self._file
@@ -403,7 +135,7 @@ class Recording:
         try:
             return np.asarray(self._file["frames"][name][frames])
         except (OSError, RuntimeError) as error:
-            raise RecordingError(describe(str(self.path), f"{name} is damaged", _reason(error))) from error
+            raise RecordingError(describe(str(self.path), f"{name} is damaged", reason(error))) from error
 
     def joint_rotations_local(self, frame: int) -> FloatArray:
         """Rotations against the parent joints, unit quaternions. (character, joint, 4)."""
@@ -446,37 +178,6 @@ class Recording:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _fields_of(simulation: Simulation) -> dict[str, Field]:
-    """What is recorded of a simulation: plain discs have no pose."""
-    fields = dict(STATE_FIELDS)
-    if simulation.bodies == "people":
-        joint_count = simulation.model.skeleton.joint_count
-        scale = f"1/{ROTATION_STEPS:.0f}"
-        fields[ROTATION] = Field(
-            np.int16, (joint_count, 4), f"joint against parent, w x y z in units of {scale}"
-        )
-        fields[PELVIS] = Field(np.float32, (3,), "pelvis in the root frame, m")
-    return fields
-
-
-def _version() -> str:
-    try:
-        return metadata.version("crowd-engine")
-    except metadata.PackageNotFoundError:
-        return "unknown"
-
-
-def _reason(error: BaseException) -> str:
-    """Say in a few words why a file operation failed."""
-    if isinstance(error, OSError) and error.errno is not None:
-        return os.strerror(error.errno)
-    text = str(error)
-    for number in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EACCES, errno.EISDIR):
-        if os.strerror(number) in text:
-            return os.strerror(number)
-    return text.splitlines()[0] if text else type(error).__name__
 
 
 def _product(first: FloatArray, second: FloatArray) -> FloatArray:

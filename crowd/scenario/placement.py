@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.scenario.geometry import Ground, overlapping_pairs
+from crowd.scenario.goals import GoalPlaces, PlacedGoal, Walker
 from crowd.scenario.plays import PlaySchedule, build_plays
 from crowd.scenario.scaling import scaled
 from crowd.scenario.schema import (
@@ -18,7 +19,6 @@ from crowd.scenario.schema import (
     Area,
     Character,
     Flow,
-    Goal,
     GoalList,
     Point,
     Region,
@@ -37,9 +37,7 @@ PURPOSE_RADIUS = 101
 PURPOSE_SPEED = 102
 PURPOSE_STATURE = 103
 PURPOSE_FACING = 104
-PURPOSE_GOAL = 105
 PEOPLE_PER_TABLE = 1 << 20
-GOAL_ATTEMPTS = 2000
 
 
 @dataclass(frozen=True)
@@ -209,8 +207,8 @@ class _Builder:
         self.scenario = scenario
         self.seed = seed
         self.ground = Ground(scenario.world)
-        self.permanent = Ground(scenario.world, only_permanent=True)
         self.problems = Problems(scenario.source)
+        self.goal_places = GoalPlaces(Ground(scenario.world, only_permanent=True), seed, self.problems)
         self.starts = Starts(self.ground, seed)
         self.people: list[_Person] = []
         self.flows: list[PlacedFlow] = []
@@ -410,56 +408,16 @@ class _Builder:
         x, z = target[0] - person.position[0], target[1] - person.position[1]
         return math.atan2(x, z) if (x, z) != (0.0, 0.0) else 0.0
 
-    def _goals(self) -> tuple[list["_PlacedGoal"], IntArray, IntArray]:
-        goals: list[_PlacedGoal] = []
+    def _goals(self) -> tuple[list[PlacedGoal], IntArray, IntArray]:
+        goals: list[PlacedGoal] = []
         first = np.zeros(len(self.people), np.int64)
         count = np.zeros(len(self.people), np.int64)
         for row, person in enumerate(self.people):
             first[row] = len(goals)
             count[row] = len(person.goals.goals)
             for number, goal in enumerate(person.goals.goals):
-                goals.append(self._place_goal(person, number, goal))
+                location = (*person.location, "goals", number)
+                is_drawn_again = person.goals.repeat or person.is_from_flow
+                walker = Walker(person.name, person.key, person.position, person.radius, is_drawn_again)
+                goals.append(self.goal_places.place(walker, number, goal, location))
         return goals, first, count
-
-    def _place_goal(self, person: _Person, number: int, goal: Goal) -> "_PlacedGoal":
-        if goal.position is not None:
-            return _PlacedGoal(goal, goal.position, None)
-        location = (*person.location, "goals", number)
-        if goal.swap_through is not None:
-            center, start = goal.swap_through, person.position
-            point = (2.0 * center[0] - start[0], 2.0 * center[1] - start[1])
-            if self.permanent.clearance(np.array([point]))[0] < person.radius - 1e-3:
-                self.problems.add(
-                    (*location, "swap_through"),
-                    f"goal of {person.name} is inside a wall or outside the bounds",
-                    [round(value, 3) for value in point],
-                    "free ground",
-                )
-            return _PlacedGoal(goal, point, None)
-        assert goal.area is not None
-        clearance = goal.clearance if goal.clearance is not None else person.radius
-        first_point = self._draw_in_area(goal.area, clearance, person.key, number)
-        if first_point is None:
-            self.problems.add(
-                (*location, "area"), "no free ground in the area", allowed=f"room for {clearance:g} m"
-            )
-            return _PlacedGoal(goal, (0.0, 0.0), None)
-        is_drawn_again = person.goals.repeat or person.is_from_flow
-        return _PlacedGoal(goal, first_point, goal.area if is_drawn_again else None)
-
-    def _draw_in_area(self, area: Area, clearance: float, key: int, number: int) -> Point | None:
-        for attempt in range(GOAL_ATTEMPTS):
-            step = number * GOAL_ATTEMPTS + attempt
-            u = float(uniform(self.seed, key, step, PURPOSE_GOAL))
-            v = float(uniform(self.seed, key, step, ~PURPOSE_GOAL))
-            point = (area.x[0] + u * (area.x[1] - area.x[0]), area.z[0] + v * (area.z[1] - area.z[0]))
-            if self.permanent.clearance(np.array([point]))[0] >= clearance:
-                return point
-        return None
-
-
-@dataclass(frozen=True)
-class _PlacedGoal:
-    goal: Goal
-    position: Point
-    area: Area | None
