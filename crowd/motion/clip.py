@@ -9,6 +9,10 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 
+TOE_ROLL = 0.05
+"""Share of a cycle between the lift of the ball of the foot and toe off; only the tip touches the ground then."""
+
+
 class FootEvent(IntEnum):
     """The eight events of one gait cycle: right and left heel strike, toe strike, heel off, toe off."""
 

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from crowd.errors import MotionError, describe
-from crowd.motion.clip import Clip, ClipKind, FootEvent, JointMask
+from crowd.motion.clip import TOE_ROLL, Clip, ClipKind, FootEvent, JointMask
 from crowd.motion.library import MotionLibrary
 from crowd.motion.skeleton import Skeleton
 from crowd_kernels.clip import PADDED_JOINTS
@@ -50,7 +50,8 @@ class ClipTable:
     cycle_duration : (E,) float64
         s.
     contact_phase : (E, 2, 2) float64
-        For each foot (right, left), share of a cycle from its strike to foot flat, and to toe off.
+        For each foot (right, left), share of a cycle from its strike to foot flat, and to the lift of the
+        ball.
     joint_mask : (M, 64) float32
         Share of a masked clip on each joint; row 0 is the full body.
     pelvis_mask : (M,) float32
@@ -169,7 +170,7 @@ def phase_times(clip: Clip, phase: FloatArray) -> FloatArray:
 
 
 def contact_phases(clip: Clip) -> FloatArray:
-    """Shares of a cycle from strike to foot flat and to toe off, for right and left foot; (2, 2)."""
+    """Shares of a cycle from strike to foot flat and to the lift of the ball, for right and left foot; (2, 2)."""
     times = strike_times(clip)
     knots, phases = np.append(times, times[1:] + clip.duration), np.arange(9) * 0.5
     result = np.zeros((2, 2))
@@ -182,7 +183,7 @@ def contact_phases(clip: Clip) -> FloatArray:
             for begin in begins:
                 end = min(time + wrap for time in ends for wrap in (0, clip.duration) if time + wrap > begin)
                 shares.append(np.interp(end, knots, phases) - np.interp(begin, knots, phases))
-            result[foot, column] = np.mean(shares)
+            result[foot, column] = np.mean(shares) - (TOE_ROLL if wanted is toe_off else 0.0)
     return result
 
 

@@ -1,0 +1,58 @@
+"""Quaternions (w, x, y, z) as arrays, for everything that is prepared before a run."""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def multiply(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Compose rotations (..., 4): `second`, then `first`."""
+    a, b = np.broadcast_arrays(first, second)
+    w, x, y, z = np.moveaxis(a, -1, 0)
+    v, p, q, r = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            w * v - x * p - y * q - z * r,
+            w * p + x * v + y * r - z * q,
+            w * q - x * r + y * v + z * p,
+            w * r + x * q - y * p + z * v,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(rotation: FloatArray) -> FloatArray:
+    """Invert unit rotations (..., 4)."""
+    return rotation * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotate(rotation: FloatArray, vector: npt.ArrayLike) -> FloatArray:
+    """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
+    axis = rotation[..., 1:]
+    twice = 2.0 * np.cross(axis, np.asarray(vector, dtype=np.float64))
+    return np.asarray(vector + rotation[..., :1] * twice + np.cross(axis, twice))
+
+
+def about(axis: int, angle: npt.ArrayLike) -> FloatArray:
+    """Rotate about x (0), y (1) or z (2) by angles (...) in rad; gives (..., 4)."""
+    half = 0.5 * np.asarray(angle, dtype=np.float64)
+    rotation = np.zeros((*half.shape, 4))
+    rotation[..., 0] = np.cos(half)
+    rotation[..., 1 + axis] = np.sin(half)
+    return rotation
+
+
+def from_axes(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
+    """Rotation whose columns are three unit axes (F, 3)."""
+    return np.asarray(Rotation.from_matrix(np.stack([x, y, z], axis=-1)).as_quat()[..., [3, 0, 1, 2]])
+
+
+def continuous(rotation: FloatArray) -> FloatArray:
+    """Choose the signs of (F, J, 4) quaternions so that they change continuously over frames."""
+    dots = np.einsum("fjc,fjc->fj", rotation[1:], rotation[:-1])
+    sign = np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)
+    result = rotation.copy()
+    result[1:] *= sign[..., None]
+    return result
