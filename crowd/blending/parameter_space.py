@@ -1,22 +1,21 @@
-"""The locomotion parameter space: automatic tessellation of examples, and what it can realise."""
+"""The locomotion parameter space: examples with weights for every point, and what they can realise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import Delaunay, QhullError
 
+from crowd.blending.tessellation import Tessellation, tessellate
 from crowd.errors import MotionError, describe
 from crowd_kernels.barycentric import SpaceArrays, locate_crowd
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 
-PLANE_TOLERANCE = 1e-9
-SLIVER_VOLUME = 1e-9
 GRID_SHAPE = (20, 14, 14)
+MARGIN = 1e-6
+"""How far the look-up grid reaches beyond the examples, in ranges."""
 AXES = ("forward speed", "turn rate", "side speed")
 
 
@@ -42,7 +41,7 @@ class ParameterSpace:
     def build(
         cls, parameters: FloatArray, cycle_duration: FloatArray, names: Sequence[str]
     ) -> "ParameterSpace":
-        """Tessellate examples.
+        """Tessellate examples, with axes divided by their range.
 
         Parameters
         ----------
@@ -55,32 +54,24 @@ class ParameterSpace:
         Raises
         ------
         MotionError
-            The examples do not span the space.
-
-        Notes
-        -----
-        Axes are divided by their range. Each of the four quadrants (turn left or right) x (side left or
-        right) is tessellated by itself, with the examples on its planes shared, so that no blend mixes turns
-        or sidesteps of opposite sides.
+            The examples do not span the space, or an example's numbers are unusable.
         """
-        parameters = np.ascontiguousarray(parameters, dtype=np.float64)
+        parameters = np.ascontiguousarray(parameters, dtype=np.float64).reshape(-1, 3)
+        cycle_duration = np.ascontiguousarray(cycle_duration, dtype=np.float64)
+        check_examples(parameters, cycle_duration, names)
         axis_range = np.ptp(parameters, axis=0)
-        for axis, extent in zip(AXES, axis_range, strict=True):
-            if not extent > 0:
-                raise MotionError(
-                    describe(
-                        "locomotion examples",
-                        f"all have the same {axis}",
-                        allowed="examples on both sides of 0",
-                    )
-                )
         points = parameters / axis_range
-        simplex = tessellate(points)
-        if len(simplex) == 0:
+        tessellation = tessellate(points)
+        if tessellation is None:
             raise MotionError(
-                describe("locomotion examples", "do not span the parameter space", f"{len(points)} examples")
+                describe(
+                    "locomotion examples",
+                    "lie in one plane of the parameter space",
+                    f"{len(points)} examples",
+                    "at least four that differ in forward speed, turn rate and side speed independently",
+                )
             )
-        return cls(tuple(names), parameters, pack(points, axis_range, cycle_duration, simplex))
+        return cls(tuple(names), parameters, pack(points, axis_range, cycle_duration, tessellation))
 
     @property
     def simplex_count(self) -> int:
@@ -115,109 +106,137 @@ class ParameterSpace:
         )
         return example, weight, realised, is_inside.astype(bool)
 
-    def reach(self, origin: npt.ArrayLike, direction: npt.ArrayLike) -> float:
-        """Find how far the space extends from a point inside along a direction, in units of `direction`."""
-        origin, direction = np.asarray(origin, float), np.asarray(direction, float)
-        inside, outside = 0.0, 1.0
-        while self.locate(origin + outside * direction)[3][0] and outside < 1e6:
-            inside, outside = outside, 2.0 * outside
-        for _ in range(50):
-            middle = 0.5 * (inside + outside)
-            if self.locate(origin + middle * direction)[3][0]:
-                inside = middle
-            else:
-                outside = middle
-        return inside
+    def extent(self, origin: npt.ArrayLike, direction: npt.ArrayLike) -> FloatArray:
+        """Find how far the space reaches from points along directions.
+
+        Parameters
+        ----------
+        origin, direction : (..., 3) array
+            m/s, rad/s, m/s; they broadcast.
+
+        Returns
+        -------
+        (...) float64
+            Units of `direction` to the farthest point of the space on each ray; 0 where it misses the space.
+        """
+        origin, direction = np.broadcast_arrays(
+            np.asarray(origin, np.float64) / self.arrays.axis_range,
+            np.asarray(direction, np.float64) / self.arrays.axis_range,
+        )
+        inverse = self.arrays.inverse.reshape(-1, 3, 3)
+        last_corner = self.arrays.example[self.arrays.simplex[:, 3]]
+        # Along a ray all barycentric weights are linear: weight = start + distance * slope.
+        start = np.einsum("sij,...sj->...si", inverse, origin[..., None, :] - last_corner)
+        slope = np.einsum("sij,...j->...si", inverse, direction)
+        start = np.concatenate([start, 1 - start.sum(axis=-1, keepdims=True)], axis=-1)
+        slope = np.concatenate([slope, -slope.sum(axis=-1, keepdims=True)], axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = -(start + 1e-12) / slope
+        leaves = np.where(slope < 0, crossing, np.inf).min(axis=-1)
+        enters = np.where(slope > 0, crossing, -np.inf).max(axis=-1)
+        is_never_inside = ((slope == 0) & (start < -1e-12)).any(axis=-1)
+        is_met = (enters <= leaves) & np.isfinite(leaves) & ~is_never_inside
+        return np.asarray(np.where(is_met, leaves, 0.0).max(axis=-1).clip(min=0.0))
 
     @property
     def maximum_forward_speed(self) -> float:
         """Largest speed straight ahead, m/s."""
-        return self.reach(np.zeros(3), (1.0, 0.0, 0.0))
+        return float(self.extent(np.zeros(3), (1.0, 0.0, 0.0)))
 
-    def maximum_turn_rate(self, forward_speed: float) -> float:
-        """Largest turn rate to both sides at a forward speed, rad/s."""
-        origin = (forward_speed, 0.0, 0.0)
-        return min(self.reach(origin, (0.0, 1.0, 0.0)), self.reach(origin, (0.0, -1.0, 0.0)))
+    def maximum_turn_rate(self, forward_speed: npt.ArrayLike) -> FloatArray:
+        """Largest turn rate that is possible to both sides at forward speeds, rad/s."""
+        return self._both_sides(forward_speed, 1)
 
-    def maximum_side_speed(self, forward_speed: float) -> float:
-        """Largest side speed to both sides at a forward speed, m/s."""
-        origin = (forward_speed, 0.0, 0.0)
-        return min(self.reach(origin, (0.0, 0.0, 1.0)), self.reach(origin, (0.0, 0.0, -1.0)))
+    def maximum_side_speed(self, forward_speed: npt.ArrayLike) -> FloatArray:
+        """Largest side speed that is possible to both sides at forward speeds, m/s."""
+        return self._both_sides(forward_speed, 2)
+
+    def _both_sides(self, forward_speed: npt.ArrayLike, axis: int) -> FloatArray:
+        origin = np.asarray(forward_speed, np.float64)[..., None] * (1.0, 0.0, 0.0)
+        direction = np.eye(3)[axis]
+        return np.minimum(self.extent(origin, direction), self.extent(origin, -direction))
 
 
-def tessellate(points: FloatArray) -> IntArray:
-    """Tessellate scaled examples, quadrant by quadrant; returns (S, 4) indices."""
-    found: dict[tuple[int, ...], None] = {}
-    for turn_side in (1.0, -1.0):
-        for step_side in (1.0, -1.0):
-            members = np.flatnonzero(
-                (turn_side * points[:, 1] >= -PLANE_TOLERANCE)
-                & (step_side * points[:, 2] >= -PLANE_TOLERANCE)
+def check_examples(parameters: FloatArray, cycle_duration: FloatArray, names: Sequence[str]) -> None:
+    """Refuse examples that cannot be tessellated.
+
+    Raises
+    ------
+    MotionError
+        A number is not finite, a duration is not positive, or all examples agree in one parameter.
+    """
+    for name, parameter, duration in zip(names, parameters, cycle_duration, strict=True):
+        if not np.isfinite(parameter).all():
+            raise MotionError(
+                describe(f'clip "{name}"', "has parameters that are not finite", parameter.tolist())
             )
-            if len(members) < 4:
-                continue
-            try:
-                cells = Delaunay(points[members], qhull_options="QJ Pp Q12").simplices
-            except QhullError:
-                continue
-            for cell in members[cells]:
-                if abs(np.linalg.det(points[cell[:3]] - points[cell[3]])) > SLIVER_VOLUME:
-                    found[tuple(sorted(int(corner) for corner in cell))] = None
-    return np.array(list(found), dtype=np.int32).reshape(-1, 4)
-
-
-def boundary_faces(simplex: IntArray) -> IntArray:
-    """Triangles that belong to one tetrahedron only; (F, 3) indices."""
-    uses: dict[tuple[int, ...], int] = {}
-    for cell in simplex:
-        for face in combinations(sorted(int(corner) for corner in cell), 3):
-            uses[face] = uses.get(face, 0) + 1
-    return np.array([face for face, count in uses.items() if count == 1], dtype=np.int32)
+        if not (np.isfinite(duration) and duration > 0):
+            raise MotionError(
+                describe(f'clip "{name}"', "has an unusable cycle duration", duration, "above 0 s")
+            )
+    for axis, values in zip(AXES, parameters.T, strict=True):
+        if len(values) == 0 or not np.ptp(values) > 0:
+            raise MotionError(
+                describe(
+                    "locomotion examples",
+                    f"all have the same {axis}",
+                    f"{len(values)} examples",
+                    f"examples that differ in {axis}",
+                )
+            )
 
 
 def pack(
-    points: FloatArray, axis_range: FloatArray, cycle_duration: FloatArray, simplex: IntArray
+    points: FloatArray, axis_range: FloatArray, cycle_duration: FloatArray, tessellation: Tessellation
 ) -> SpaceArrays:
     """Prepare a tessellation for the look-up kernel."""
+    simplex, cone_face = tessellation.simplex, tessellation.cone_face
     corners = points[simplex]
-    edges = np.transpose(corners[:, :3] - corners[:, 3:], (0, 2, 1))
-    inverse = np.linalg.inv(edges).reshape(-1, 9)
-    lowest, highest = points.min(axis=0) - 1e-6, points.max(axis=0) + 1e-6
+    inverse = inverse_rows(corners[:, :3] - corners[:, 3:])
+    origin = points.min(axis=0) - MARGIN
     shape = np.array(GRID_SHAPE, dtype=np.int64)
-    scale = shape / (highest - lowest)
-    first = np.clip(np.floor((corners.min(axis=1) - 1e-6 - lowest) * scale), 0, shape - 1).astype(int)
-    last = np.clip(np.floor((corners.max(axis=1) + 1e-6 - lowest) * scale), 0, shape - 1).astype(int)
-    cells: list[list[int]] = [[] for _ in range(int(shape.prod()))]
-    for number, (low, high) in enumerate(zip(first, last, strict=True)):
-        for i in range(low[0], high[0] + 1):
-            for j in range(low[1], high[1] + 1):
-                for k in range(low[2], high[2] + 1):
-                    if touches(inverse[number], corners[number, 3], lowest, scale, (i, j, k)):
-                        cells[(i * shape[1] + j) * shape[2] + k].append(number)
-    start = np.concatenate([[0], np.cumsum([len(cell) for cell in cells])]).astype(np.int32)
+    scale = shape / (points.max(axis=0) + MARGIN - origin)
+    cell_start, cell_simplex = candidates(corners, inverse, origin, scale)
     return SpaceArrays(
-        np.ascontiguousarray(axis_range),
-        np.ascontiguousarray(points),
-        np.ascontiguousarray(cycle_duration, dtype=np.float64),
-        simplex,
-        np.ascontiguousarray(inverse),
-        boundary_faces(simplex),
-        lowest,
-        scale,
-        shape,
-        start,
-        np.array([number for cell in cells for number in cell], dtype=np.int32),
+        axis_range=np.ascontiguousarray(axis_range),
+        example=np.ascontiguousarray(points),
+        cycle_duration=cycle_duration,
+        simplex=simplex,
+        inverse=inverse,
+        hull_face=tessellation.hull_face,
+        hull_plane=tessellation.hull_plane,
+        centre=tessellation.centre,
+        cone_face=cone_face,
+        cone_inverse=inverse_rows(points[cone_face] - tessellation.centre),
+        grid_origin=origin,
+        grid_scale=scale,
+        grid_shape=shape,
+        cell_start=cell_start,
+        cell_simplex=cell_simplex,
     )
 
 
-def touches(
-    inverse: FloatArray, corner: FloatArray, lowest: FloatArray, scale: FloatArray, cell: tuple[int, int, int]
-) -> bool:
-    """A tetrahedron may touch a grid cell: no face of it has the whole cell on its outer side."""
-    box = (
-        np.array(np.meshgrid(*[(index - 1e-3, index + 1 + 1e-3) for index in cell])).reshape(3, 8).T / scale
-        + lowest
-    )
-    weights = (box - corner) @ inverse.reshape(3, 3).T
-    all_weights = np.column_stack([weights, 1 - weights.sum(axis=1)])
-    return bool((all_weights.max(axis=0) >= -1e-9).all())
+def inverse_rows(directions: FloatArray) -> FloatArray:
+    """Invert the matrices whose columns are three directions each; (n, 9) row-major."""
+    return np.ascontiguousarray(np.linalg.inv(np.transpose(directions, (0, 2, 1))).reshape(-1, 9))
+
+
+def candidates(
+    corners: FloatArray, inverse: FloatArray, origin: FloatArray, scale: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """List the tetrahedra that may touch each grid cell: offsets (cells + 1,) and tetrahedra, cell by cell.
+
+    A tetrahedron misses a cell when the whole cell lies beyond one of its faces. Cells are taken a little
+    larger than they are, so that rounding in the look-up cannot pick a cell that lacks its tetrahedron.
+    """
+    index = np.indices(GRID_SHAPE).reshape(3, -1).T
+    bits = np.indices((2, 2, 2)).reshape(3, 8).T
+    box = (index[:, None] + np.where(bits, 1 + 1e-3, -1e-3)) / scale + origin
+    touching = []
+    for corner, rows in zip(corners[:, 3], inverse.reshape(-1, 3, 3), strict=True):
+        weight = (box - corner) @ rows.T
+        weight = np.concatenate([weight, 1 - weight.sum(axis=-1, keepdims=True)], axis=-1)
+        touching.append((weight.max(axis=1) >= 0).all(axis=-1))
+    cell, simplex = np.nonzero(np.array(touching).T)
+    start = np.searchsorted(cell, np.arange(len(index) + 1))
+    return start.astype(np.int32), simplex.astype(np.int32)
