@@ -15,7 +15,7 @@ TOE_LENGTH = 0.04
 """Tip of the foot before the ball, over stature."""
 
 LOCK_LIMITS = LockLimits(
-    release_distance=0.2, release_yaw=0.6, stretch=0.998, swing_rate=16.0, ground_rate=30.0, pelvis_rate=28.0
+    release_distance=0.2, release_yaw=0.6, stretch=0.99, swing_rate=16.0, ground_rate=30.0, pelvis_rate=28.0
 )
 
 
