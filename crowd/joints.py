@@ -6,7 +6,7 @@ from crowd.controllers.controller import IntArray
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.people import People
 from crowd.state import Float32Array, FloatArray, State
-from crowd_kernels.pose import CHUNKS, LANES, kinematics
+from crowd_kernels.pose import CHUNKS, kinematics, scratch_length
 
 
 class Joints:
@@ -27,7 +27,7 @@ class Joints:
         self._parent = np.ascontiguousarray(skeleton.parent, np.int32)
         self._offset = np.ascontiguousarray(skeleton.offset, np.float32)
         self._segment = np.ascontiguousarray(skeleton.segment, np.int32)
-        self._scratch = np.zeros((CHUNKS, joint_count * 11 * LANES + len(Segment) * LANES), np.float32)
+        self._scratch = np.zeros((CHUNKS, scratch_length(joint_count, len(Segment))), np.float32)
 
     def compute(self, state: State, people: People, active: IntArray) -> None:
         """Compute the joints of active people from their pose."""

@@ -68,13 +68,15 @@ def source_digest(module: str) -> str:
     return digest.hexdigest()
 
 
-def _compile(function: Callable[P, R], *, parallel: bool) -> Callable[P, R]:
+def _compile(function: Callable[P, R], *, parallel: bool = False, is_inlined: bool = False) -> Callable[P, R]:
     flags = ("-parallel" if parallel else "") + ("-bounds" if CHECKS_BOUNDS else "")
     digest = source_digest(function.__module__.rpartition(".")[2])
     name = function.__qualname__
     function.__qualname__ = f"{name}-{digest}{flags}"
     try:
-        compiled = numba.njit(cache=True, error_model="numpy", parallel=parallel, nogil=True)(function)
+        compiled = numba.njit(
+            cache=True, error_model="numpy", parallel=parallel, nogil=True, forceinline=is_inlined
+        )(function)
     finally:
         function.__qualname__ = name
     return cast("Callable[P, R]", compiled)
@@ -82,7 +84,17 @@ def _compile(function: Callable[P, R], *, parallel: bool) -> Callable[P, R]:
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a serial kernel: strict arithmetic, NumPy's error model, cached on disk."""
-    return _compile(function, parallel=False)
+    return _compile(function)
+
+
+def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a row leaf that LLVM merges into its callers.
+
+    A slice handed to a kernel that stays a call of its own is counted up and down atomically, in memory that
+    all threads share. For a leaf of some tens of instructions this takes longer than its arithmetic; merged,
+    the counting vanishes, and rows stay rows, unlike with Numba's own ``inline="always"``.
+    """
+    return _compile(function, is_inlined=True)
 
 
 class ParallelKernel(Generic[P, R]):
@@ -97,7 +109,7 @@ class ParallelKernel(Generic[P, R]):
         self.__name__ = function.__name__
         self.__module__ = function.__module__
         self.__wrapped__ = function
-        self.serial: Callable[P, R] = _compile(function, parallel=False)
+        self.serial: Callable[P, R] = _compile(function)
         self.threaded: Callable[P, R] = _compile(function, parallel=True)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:

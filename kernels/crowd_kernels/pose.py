@@ -1,18 +1,80 @@
-"""Forward kinematics. Sixteen characters are the lanes of a block."""
+"""Forward kinematics, with sixteen characters as the lanes of a block, and access to single joints of a pose.
+
+Inside a block every joint is one flat row: components outermost, 16 lanes each. Pose rows come in and joint
+arrays go out through interleaving in two steps of four: interleaving 4 streams moves the upper two bits of an
+index to its end, so two steps move the four bits that number the lanes. LLVM turns each step into shuffles.
+"""
 
 from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
 from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.quaternion import Quaternion, Vector, multiply, rotate
 
 CHUNKS = 32
 LANES = 16
+STREAM = 4 * PADDED_JOINTS
+COMPONENT = LANES * PADDED_JOINTS
 TWO = np.float32(2.0)
 
 
-@kernel
+def scratch_length(joint_count: int, segment_count: int) -> int:
+    """Length of one chunk's scratch row for `kinematics`.
+
+    Parameters
+    ----------
+    joint_count : int
+        Joints of the skeleton, at most 64.
+    segment_count : int
+        Columns of the proportions.
+
+    Returns
+    -------
+    int
+        Number of float32.
+    """
+    return 5 * COMPONENT + (7 * joint_count + segment_count) * LANES
+
+
+@inlined_kernel
+def interleave(a: Any, b: Any, c: Any, d: Any, count: int, out: Any) -> None:
+    """Merge four streams into one: a[0] b[0] c[0] d[0] a[1] b[1] ...
+
+    Parameters
+    ----------
+    a, b, c, d : (>= count,) float32
+    count : int
+    out : (>= 4 * count,) float32
+        Written.
+    """
+    for i in range(count):
+        out[4 * i] = a[i]
+        out[4 * i + 1] = b[i]
+        out[4 * i + 2] = c[i]
+        out[4 * i + 3] = d[i]
+
+
+@inlined_kernel
+def deinterleave(merged: Any, count: int, out_a: Any, out_b: Any, out_c: Any, out_d: Any) -> None:
+    """Split one stream into four, the inverse of `interleave`.
+
+    Parameters
+    ----------
+    merged : (>= 4 * count,) float32
+    count : int
+    out_a, out_b, out_c, out_d : (>= count,) float32
+        Written.
+    """
+    for i in range(count):
+        out_a[i] = merged[4 * i]
+        out_b[i] = merged[4 * i + 1]
+        out_c[i] = merged[4 * i + 2]
+        out_d[i] = merged[4 * i + 3]
+
+
+@inlined_kernel
 def child_row(
     parent_rotation: Any,
     parent_position: Any,
@@ -24,9 +86,24 @@ def child_row(
     out_rotation: Any,
     out_position: Any,
 ) -> None:
-    """Place one joint below its parent for 16 characters; flat float32 rows, components outermost.
+    """Place one joint below its parent for 16 characters.
 
-    Rotations are (64,), positions (48,), `scale` (16,); x, y, z is the rest offset in the parent's frame.
+    Parameters
+    ----------
+    parent_rotation : (64,) float32
+        Unit quaternions in the root frame, components outermost.
+    parent_position : (48,) float32
+        m, components outermost.
+    local : (>= 3088,) float32
+        Local rotations of the joint: w from 0, x from 1024, y from 2048, z from 3072.
+    scale : (16,) float32
+        Proportions of the joint's segment.
+    x, y, z : float32
+        Rest offset in the parent's frame, m.
+    out_rotation : (64,) float32
+        Written, as `parent_rotation`.
+    out_position : (48,) float32
+        Written, as `parent_position`.
     """
     for lane in range(LANES):
         pw = parent_rotation[lane]
@@ -34,9 +111,9 @@ def child_row(
         py = parent_rotation[2 * LANES + lane]
         pz = parent_rotation[3 * LANES + lane]
         lw = local[lane]
-        lx = local[LANES + lane]
-        ly = local[2 * LANES + lane]
-        lz = local[3 * LANES + lane]
+        lx = local[COMPONENT + lane]
+        ly = local[2 * COMPONENT + lane]
+        lz = local[3 * COMPONENT + lane]
         out_rotation[lane] = pw * lw - px * lx - py * ly - pz * lz
         out_rotation[LANES + lane] = pw * lx + px * lw + py * lz - pz * ly
         out_rotation[2 * LANES + lane] = pw * ly - px * lz + py * lw + pz * lx
@@ -53,6 +130,79 @@ def child_row(
 
 
 @kernel
+def gather_block(pose_rotation: Any, active: Any, first: int, spare: Any, out_local: Any) -> None:
+    """Turn the pose rows of 16 active characters into lanes; the last character fills up the block.
+
+    Parameters
+    ----------
+    pose_rotation : (N, 256) float32
+        Pose rows.
+    active : (A,) int32
+    first : int
+        Place in `active` of the first lane, below A.
+    spare : (1024,) float32
+        Scratch.
+    out_local : (4096,) float32
+        Written: component, joint, lane.
+    """
+    last = active.shape[0] - 1
+    for component in range(4):
+        begin = component * PADDED_JOINTS
+        end = begin + PADDED_JOINTS
+        for stream in range(4):
+            interleave(
+                pose_rotation[active[min(first + stream, last)], begin:end],
+                pose_rotation[active[min(first + stream + 4, last)], begin:end],
+                pose_rotation[active[min(first + stream + 8, last)], begin:end],
+                pose_rotation[active[min(first + stream + 12, last)], begin:end],
+                PADDED_JOINTS,
+                spare[stream * STREAM : (stream + 1) * STREAM],
+            )
+        interleave(
+            spare[:STREAM],
+            spare[STREAM : 2 * STREAM],
+            spare[2 * STREAM : 3 * STREAM],
+            spare[3 * STREAM : 4 * STREAM],
+            STREAM,
+            out_local[component * COMPONENT : (component + 1) * COMPONENT],
+        )
+
+
+@kernel
+def scatter_block(block: Any, length: int, active: Any, first: int, spare: Any, out_rows: Any) -> None:
+    """Write the lanes of a block to the rows of their characters.
+
+    Lanes that only fill up a block hold the values of the last character, and write them to its row again.
+
+    Parameters
+    ----------
+    block : (length * 16,) float32
+        Value, lane.
+    length : int
+        Values of one character.
+    active : (A,) int32
+    first : int
+        Place in `active` of the first lane, below A.
+    spare : (>= length * 16,) float32
+        Scratch.
+    out_rows : (N, length) float32
+        Written in the rows of 16 active characters.
+    """
+    last = active.shape[0] - 1
+    part = 4 * length
+    deinterleave(block, part, spare[:part], spare[part : 2 * part], spare[2 * part : 3 * part], spare[3 * part :])
+    for stream in range(4):
+        deinterleave(
+            spare[stream * part : (stream + 1) * part],
+            length,
+            out_rows[active[min(first + stream, last)]],
+            out_rows[active[min(first + stream + 4, last)]],
+            out_rows[active[min(first + stream + 8, last)]],
+            out_rows[active[min(first + stream + 12, last)]],
+        )
+
+
+@kernel
 def kinematics_chunk(
     parent: Any,
     offset: Any,
@@ -64,57 +214,62 @@ def kinematics_chunk(
     active: Any,
     begin: int,
     end: int,
-    local: Any,
-    rotation: Any,
-    position: Any,
-    scale: Any,
+    scratch: Any,
     out_joint_position_model: Any,
     out_joint_rotation_model: Any,
 ) -> None:
-    """Process one run of blocks of 16 active characters; arguments as in `kinematics`, with one chunk's scratch."""
+    """Compute the joints of one run of blocks of 16 active characters.
+
+    Parameters
+    ----------
+    begin, end : int
+        Range of blocks.
+    scratch : (scratch_length(J, G),) float32
+        Row of this chunk.
+
+    Notes
+    -----
+    All other arguments are those of `kinematics`.
+    """
     count = active.shape[0]
     joint_count = parent.shape[0]
+    position_begin = 5 * COMPONENT + joint_count * 4 * LANES
+    scale_begin = position_begin + joint_count * 3 * LANES
+    local = scratch[: 4 * COMPONENT]
+    spare = scratch[4 * COMPONENT : 5 * COMPONENT]
+    rotation = scratch[5 * COMPONENT : position_begin]
+    position = scratch[position_begin:scale_begin]
+    scale = scratch[scale_begin:]
+    position_rows = out_joint_position_model.reshape(out_joint_position_model.shape[0], joint_count * 3)
+    rotation_rows = out_joint_rotation_model.reshape(out_joint_rotation_model.shape[0], joint_count * 4)
     for block in range(begin, end):
         first = block * LANES
+        gather_block(pose_rotation, active, first, spare, local)
         for lane in range(LANES):
             character = active[min(first + lane, count - 1)]
-            for joint in range(joint_count):
-                local[joint * 64 + lane] = pose_rotation[character, joint]
-                local[joint * 64 + LANES + lane] = pose_rotation[character, PADDED_JOINTS + joint]
-                local[joint * 64 + 2 * LANES + lane] = pose_rotation[character, 2 * PADDED_JOINTS + joint]
-                local[joint * 64 + 3 * LANES + lane] = pose_rotation[character, 3 * PADDED_JOINTS + joint]
             for part in range(segment_scale.shape[1]):
                 scale[part * LANES + lane] = segment_scale[character, part]
             leg = segment_scale[character, leg_segment]
-            position[lane] = pose_pelvis[character, 0] * leg
-            position[LANES + lane] = pose_pelvis[character, 1] * leg
-            position[2 * LANES + lane] = pose_pelvis[character, 2] * leg
-        rotation[:64] = local[:64]
+            for component in range(3):
+                position[component * LANES + lane] = pose_pelvis[character, component] * leg
+            for component in range(4):
+                rotation[component * LANES + lane] = local[component * COMPONENT + lane]
         for joint in range(1, joint_count):
             above = parent[joint]
             part = segment[joint]
             child_row(
-                rotation[above * 64 : above * 64 + 64],
-                position[above * 48 : above * 48 + 48],
-                local[joint * 64 : joint * 64 + 64],
-                scale[part * LANES : part * LANES + LANES],
+                rotation[above * 4 * LANES : (above + 1) * 4 * LANES],
+                position[above * 3 * LANES : (above + 1) * 3 * LANES],
+                local[joint * LANES :],
+                scale[part * LANES : (part + 1) * LANES],
                 offset[joint, 0],
                 offset[joint, 1],
                 offset[joint, 2],
-                rotation[joint * 64 : joint * 64 + 64],
-                position[joint * 48 : joint * 48 + 48],
+                rotation[joint * 4 * LANES : (joint + 1) * 4 * LANES],
+                position[joint * 3 * LANES : (joint + 1) * 3 * LANES],
             )
-        for lane in range(min(LANES, count - first)):
-            character = active[first + lane]
-            for joint in range(joint_count):
-                for component in range(3):
-                    out_joint_position_model[character, joint, component] = position[
-                        joint * 48 + component * LANES + lane
-                    ]
-                for component in range(4):
-                    out_joint_rotation_model[character, joint, component] = rotation[
-                        joint * 64 + component * LANES + lane
-                    ]
+        scatter_block(position, joint_count * 3, active, first, local, position_rows)
+        scatter_block(rotation, joint_count * 4, active, first, local, rotation_rows)
 
 
 @parallel_kernel
@@ -136,35 +291,34 @@ def kinematics(
     Parameters
     ----------
     parent : (J,) int32
-        Parents, each before its children; joint 0 is the pelvis.
+        Parents, each before its children; joint 0 is the pelvis. At most 64 joints.
     offset : (J, 3) float32
-        Rest offsets in the parent's frame, m.
+        Rest offsets in the parent's frame, m; row 0 is not read.
     segment : (J,) int32
-        Column of `segment_scale` that stretches each offset.
+        Column of `segment_scale` that stretches each offset, 0 to G - 1.
     leg_segment : int
         Column that stretches the pelvis position.
     segment_scale : (N, G) float32
-        Proportions.
+        Proportions, about 1.
     pose_rotation : (N, 256) float32
-        Local rotations, components outermost.
+        Pose rows: unit local rotations.
     pose_pelvis : (N, 3) float32
         Pelvis in the root frame at leg scale 1, m.
     active : (A,) int32
-        Characters to process.
-    scratch : (32, J * 176 + G * 16) float32
-        Blocks of the chunks.
+        Characters to process, each once; 0 to N - 1.
+    scratch : (32, scratch_length(J, G)) float32
+        One row for each chunk.
     out_joint_position_model : (N, J, 3) float32
         Written in rows of `active`, m.
     out_joint_rotation_model : (N, J, 4) float32
-        Written in rows of `active`, unit quaternions.
+        Written in rows of `active`, unit quaternions (w, x, y, z).
 
     Notes
     -----
     **Source:** forward kinematics of a tree with rest rotations aligned to the root frame.
+    **Differs from the source:** offsets are stretched by the character's proportions.
     """
-    count = active.shape[0]
-    joint_count = parent.shape[0]
-    block_count = (count + LANES - 1) // LANES
+    block_count = (active.shape[0] + LANES - 1) // LANES
     for k in prange(CHUNKS):
         chunk = (k * 37) % CHUNKS
         kinematics_chunk(
@@ -178,10 +332,135 @@ def kinematics(
             active,
             chunk * block_count // CHUNKS,
             (chunk + 1) * block_count // CHUNKS,
-            scratch[chunk, : joint_count * 64],
-            scratch[chunk, joint_count * 64 : joint_count * 128],
-            scratch[chunk, joint_count * 128 : joint_count * 176],
-            scratch[chunk, joint_count * 176 :],
+            scratch[chunk],
             out_joint_position_model,
             out_joint_rotation_model,
         )
+
+
+@kernel
+def local_rotation_chunk(
+    pose_rotation: Any, active: Any, begin: int, end: int, row: Any, out_rotation_local: Any
+) -> None:
+    """Convert one run of active characters.
+
+    Parameters
+    ----------
+    begin, end : int
+        Range of `active`.
+    row : (256,) float32
+        Scratch.
+
+    Notes
+    -----
+    All other arguments are those of `local_rotations`.
+    """
+    length = out_rotation_local.shape[1] * 4
+    out_rows = out_rotation_local.reshape(out_rotation_local.shape[0], length)
+    for index in range(begin, end):
+        character = active[index]
+        pose = pose_rotation[character]
+        interleave(
+            pose[:PADDED_JOINTS],
+            pose[PADDED_JOINTS : 2 * PADDED_JOINTS],
+            pose[2 * PADDED_JOINTS : 3 * PADDED_JOINTS],
+            pose[3 * PADDED_JOINTS :],
+            PADDED_JOINTS,
+            row,
+        )
+        out_rows[character] = row[:length]
+
+
+@parallel_kernel
+def local_rotations(pose_rotation: Any, active: Any, scratch: Any, out_rotation_local: Any) -> None:
+    """Convert pose rows to plain quaternions, for recordings and exporters.
+
+    Parameters
+    ----------
+    pose_rotation : (N, 256) float32
+        Pose rows.
+    active : (A,) int32
+        Characters to process, each once; 0 to N - 1.
+    scratch : (32, 256) float32
+        One row for each chunk.
+    out_rotation_local : (N, J, 4) float32
+        Written in rows of `active`: the same values as (w, x, y, z), J at most 64.
+    """
+    count = active.shape[0]
+    for k in prange(CHUNKS):
+        chunk = (k * 37) % CHUNKS
+        local_rotation_chunk(
+            pose_rotation,
+            active,
+            chunk * count // CHUNKS,
+            (chunk + 1) * count // CHUNKS,
+            scratch[chunk],
+            out_rotation_local,
+        )
+
+
+@kernel
+def joint_rotation(pose_row: Any, joint: int) -> Quaternion:
+    """Read the local rotation of a joint.
+
+    Parameters
+    ----------
+    pose_row : (256,) float32
+    joint : int
+        0 to 63.
+
+    Returns
+    -------
+    tuple of float
+        (w, x, y, z).
+    """
+    return (
+        float(pose_row[joint]),
+        float(pose_row[PADDED_JOINTS + joint]),
+        float(pose_row[2 * PADDED_JOINTS + joint]),
+        float(pose_row[3 * PADDED_JOINTS + joint]),
+    )
+
+
+@kernel
+def set_joint_rotation(pose_row: Any, joint: int, rotation: Quaternion) -> None:
+    """Write the local rotation of a joint.
+
+    Parameters
+    ----------
+    pose_row : (256,) float32
+        Written at one joint.
+    joint : int
+        0 to 63.
+    rotation : tuple of float
+        (w, x, y, z), unit length.
+    """
+    pose_row[joint] = rotation[0]
+    pose_row[PADDED_JOINTS + joint] = rotation[1]
+    pose_row[2 * PADDED_JOINTS + joint] = rotation[2]
+    pose_row[3 * PADDED_JOINTS + joint] = rotation[3]
+
+
+@kernel
+def child_joint(
+    parent_rotation: Quaternion, parent_position: Vector, offset: Vector, local: Quaternion
+) -> tuple[Quaternion, Vector]:
+    """Place one joint below its parent, to walk along a short chain such as a leg.
+
+    Parameters
+    ----------
+    parent_rotation, parent_position : tuple of float
+        Parent in any frame; m.
+    offset : tuple of float
+        Rest offset in the parent's frame in the character's own proportions, m.
+    local : tuple of float
+        Local rotation of the joint.
+
+    Returns
+    -------
+    rotation, position : tuple of float
+        The joint in the parent's outer frame.
+    """
+    ahead = rotate(parent_rotation, offset)
+    position = parent_position[0] + ahead[0], parent_position[1] + ahead[1], parent_position[2] + ahead[2]
+    return multiply(parent_rotation, local), position

@@ -5,7 +5,7 @@ import pytest
 
 from crowd_kernels import _jit
 from crowd_kernels.clip import blend_samples
-from crowd_kernels.pose import kinematics
+from crowd_kernels.pose import CHUNKS, kinematics, scratch_length
 from tests.oracles import pose as oracle
 
 JOINTS = 20
@@ -95,7 +95,7 @@ def make_kinematics(rng, count):
         "pose_rotation": random_rows(rng, count),
         "pose_pelvis": rng.normal(0, 1, (count, 3)).astype(np.float32),
         "active": np.arange(count, dtype=np.int32),
-        "scratch": np.zeros((32, JOINTS * 176 + 128), np.float32),
+        "scratch": np.zeros((CHUNKS, scratch_length(JOINTS, 8)), np.float32),
         "out_joint_position_model": np.zeros((count, JOINTS, 3), np.float32),
         "out_joint_rotation_model": np.zeros((count, JOINTS, 4), np.float32),
     }
