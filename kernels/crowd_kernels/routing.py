@@ -97,7 +97,10 @@ def is_free_line(grid: GridArrays, x: float, z: float, to_x: float, to_z: float,
             other = cell + step_z * grid.columns
             next_z += delta_z
         if is_leaving:
-            is_leaving = grid.mask[other] == 0
+            # Beyond a second blocked cell may lie the other side of a wall.
+            if grid.mask[other] == 0:
+                return False
+            is_leaving = False
         elif not (grid.mask[cell] >> move) & 1:
             return False
         cell = other
