@@ -14,7 +14,7 @@ IntArray = npt.NDArray[np.int32]
 ByteArray = npt.NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
 
-SUBCELLS = 5
+SUBCELLS = 7
 """A body's place is looked for on so many lines across a cell."""
 MARGIN = 0.01
 """A gap may be narrower than the body by this much, m: rounding of what a user wrote."""
@@ -103,7 +103,9 @@ class Grid:
         through thin walls and gaps that are too narrow.
         """
         centers = layout.centers()
-        room, nearby = clearance(tree, centers, reach=radius + layout.cell_size)
+        close = cells_near(layout, tree, radius + layout.cell_size)
+        room, nearby = np.full(layout.cell_count, np.inf), np.zeros(layout.cell_count, np.bool_)
+        room[close], nearby[close] = clearance(tree, centers[close], reach=radius + layout.cell_size)
         is_open = room >= radius
         point = centers.copy()
         best_room = room.copy()
@@ -153,6 +155,24 @@ def clearance(
         )
         distance[asked] = gap
     return distance, np.isfinite(distance)
+
+
+def cells_near(layout: Layout, tree: shapely.STRtree, reach: float) -> npt.NDArray[np.intp]:
+    """Cells whose centre may be within `reach` of an obstacle: those near the boxes around obstacles."""
+    is_near = np.zeros((layout.rows, layout.columns), np.bool_)
+    for low_x, low_z, high_x, high_z in shapely.bounds(tree.geometries).reshape(-1, 4):
+        first = np.floor(
+            np.array([low_x - layout.low_x, low_z - layout.low_z]) / layout.cell_size
+            - reach / layout.cell_size
+        )
+        last = np.ceil(
+            np.array([high_x - layout.low_x, high_z - layout.low_z]) / layout.cell_size
+            + reach / layout.cell_size
+        )
+        column, row = np.maximum(first, 0).astype(int)
+        end_column, end_row = np.maximum(last, 0).astype(int)
+        is_near[row : end_row + 1, column : end_column + 1] = True
+    return np.flatnonzero(is_near.ravel())
 
 
 def close_narrow_moves(

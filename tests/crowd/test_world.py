@@ -1,0 +1,135 @@
+"""The walkable world: doors that bodies fit through, thin walls, obstacles that come and go, ways that lead there."""
+
+import numpy as np
+import pytest
+
+from crowd.navigation.routing import Routing
+from crowd.world import World
+from crowd.world.obstacles import Box, Polygon, Wall
+from tests.oracles import routing as oracle
+
+BOUNDS = (-10.0, 10.0, -10.0, 10.0)
+
+
+def points(*places):
+    return np.array([[x, 0.0, z] for x, z in places])
+
+
+@pytest.mark.parametrize("shift", np.linspace(0, 0.25, 8))
+@pytest.mark.parametrize(("gap", "fits"), [(1.2, True), (1.02, True), (0.95, False), (0.5, False)])
+def test_a_door_lets_bodies_through_wherever_the_grid_lies(shift, gap, fits):
+    walls = [Box(-10.0, shift - gap / 2, -0.2, 0.2), Box(shift + gap / 2, 11.0, -0.2, 0.2)]
+    world = World(BOUNDS, walls)
+    assert world.is_reachable(points((0, -5)), points((3, 5)), 0.5)[0] == fits
+
+
+def test_thin_walls_stop_bodies_of_any_size():
+    world = World(BOUNDS, [Wall((-11.0, 0.03), (11.0, 0.03))])
+    for radius in (0.1, 0.25, 0.5):
+        assert not world.is_reachable(points((0, -2)), points((0, 2)), radius)[0]
+
+
+def test_slanted_polygons_block_their_inside():
+    world = World(BOUNDS, [Polygon(((-3, 0), (0, -3), (3, 0), (0, 3)))])
+    assert list(world.is_walkable(points((0, 0), (2.4, 2.4), (1.8, 1.8), (11, 0)), 0.25)) == [
+        False,
+        True,
+        True,
+        False,
+    ]
+    near = world.nearest_walkable(points((0.5, 0.5)), 0.25)
+    assert world.clearance_at(near)[0] >= 0.24
+
+
+def test_obstacles_close_and_open_a_way():
+    world = World(BOUNDS, [Box(-10, -1, -0.2, 0.2), Box(1, 10, -0.2, 0.2)])
+    start, goal = points((0, -5)), points((0, 5))
+    assert world.is_reachable(start, goal, 0.25)[0]
+    number = world.add_obstacle(Box(-1, 1, -0.1, 0.1))
+    assert not world.is_reachable(start, goal, 0.25)[0]
+    world.remove_obstacle(number)
+    assert world.is_reachable(start, goal, 0.25)[0]
+
+
+def test_bad_shapes_are_refused():
+    with pytest.raises(ValueError, match="polygon"):
+        Polygon(((0, 0), (1, 1), (1, 0), (0, 1)))
+    with pytest.raises(ValueError, match="wall"):
+        Wall((1, 1), (1, 1))
+    with pytest.raises(ValueError, match="bounds"):
+        World((1, 0, 0, 1))
+
+
+def follow(world, start, goal, radius=0.3, steps=2800):
+    """Walk points along their way points; returns all positions (step, N, 3) and the routing."""
+    position = np.array(start)
+    routing = Routing(world, len(position))
+    everyone = np.arange(len(position), dtype=np.int32)
+    routing.set_goals(everyone, goal, np.full(len(position), radius), position)
+    way_point, remaining = position.copy(), np.zeros(len(position))
+    track = []
+    for step in range(steps):
+        routing.way_points(position, everyone, step, way_point, remaining)
+        way = way_point - position
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        position = position + way / np.maximum(length, 1e-9) * np.minimum(length, 0.03)
+        track.append(position.copy())
+        if (np.linalg.norm(position - goal, axis=1) < 0.05).all():
+            break
+    return np.array(track), routing
+
+
+MAZE = [Box(-10, 6, -6.2, -5.8), Box(-6, 10, -2.2, -1.8), Box(-10, 6, 1.8, 2.2), Wall((-6, 6), (10, 6))]
+
+
+@pytest.mark.parametrize("count", [3, 14], ids=["own searches", "a shared field"])
+def test_way_points_lead_to_the_goal_without_touching_walls(count, rng):
+    world = World(BOUNDS, MAZE)
+    start = np.stack([rng.uniform(-9, 9, count), np.zeros(count), np.full(count, -8.0)], axis=1)
+    goal = np.tile([8.0, 0.0, 9.0], (count, 1))
+    track, _ = follow(world, start, goal)
+    np.testing.assert_allclose(track[-1], goal, atol=0.06)
+    for character in range(count):
+        assert world.clearance_at(track[:, character]).min() > 0.12
+        length = np.linalg.norm(np.diff(track[:, character], axis=0), axis=1).sum()
+        best = oracle.shortest_way(world, start[character], goal[character], 0.3)
+        assert length < 1.05 * best + 0.6
+
+
+def test_a_way_that_is_closed_is_found_anew():
+    world = World(BOUNDS, [Box(-6, 6, -0.2, 0.2)])
+    position, goal = points((-3.0, -5.0)), points((-3.0, 5.0))
+    one = np.zeros(1, np.int32)
+    routing = Routing(world, 1)
+    routing.set_goals(one, goal, np.array([0.25]), position)
+    way_point, remaining = position.copy(), np.zeros(1)
+    routing.way_points(position, one, 0, way_point, remaining)
+    assert way_point[0, 0] < -6.0, "round the near end"
+    before = remaining[0]
+    world.add_obstacle(Box(-10, -6, -0.2, 0.2))
+    routing.way_points(position, one, 1, way_point, remaining)
+    routing.way_points(position, one, 2, way_point, remaining)
+    assert way_point[0, 0] > 6.0, "round the far end"
+    assert remaining[0] > before + 3.0
+
+
+def test_unreachable_goals_leave_people_where_they_are():
+    world = World(BOUNDS, [Wall((-11.0, 0.0), (11.0, 0.0))])
+    position = points((0, -5))
+    one = np.zeros(1, np.int32)
+    routing = Routing(world, 1)
+    routing.set_goals(one, points((0, 5)), np.array([0.25]), position)
+    way_point, remaining = np.zeros((1, 3)), np.zeros(1)
+    routing.way_points(position, one, 0, way_point, remaining)
+    assert routing.status[0] != 0
+    assert np.isinf(remaining[0])
+    np.testing.assert_array_equal(way_point, position)
+
+
+def test_a_large_world_is_built_quickly(rng):
+    import time
+
+    boxes = [Box(x, x + 1, z, z + 1) for x, z in rng.uniform(-95, 95, (300, 2))]
+    begin = time.perf_counter()
+    World((-100, 100, -100, 100), boxes).grid(0.5)
+    assert time.perf_counter() - begin < 10.0
