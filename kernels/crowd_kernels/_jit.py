@@ -32,12 +32,16 @@ def imported_modules(source: str) -> set[str]:
     """Names of this package's modules that a source text imports, such as ``{"quaternion"}``."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(source)):
-        if not isinstance(node, ast.ImportFrom) or node.module is None:
+        if isinstance(node, ast.Import):
+            paths = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            origin = node.module or ""
+            if node.level > 0:
+                origin = f"{PACKAGE_NAME}.{origin}".rstrip(".")
+            paths = [origin, *(f"{origin}.{alias.name}" for alias in node.names)]
+        else:
             continue
-        if node.module == PACKAGE_NAME:
-            found.update(alias.name for alias in node.names)
-        elif node.module.startswith(PACKAGE_NAME + "."):
-            found.add(node.module.split(".")[1])
+        found.update(path.split(".")[1] for path in paths if path.startswith(PACKAGE_NAME + "."))
     return {name for name in found if (PACKAGE_FOLDER / f"{name}.py").is_file()}
 
 
