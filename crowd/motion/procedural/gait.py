@@ -53,7 +53,8 @@ def cyclic_clip(
     side: float = 0.0,
 ) -> Clip:
     """Make two cycles of a gait at constant velocity; speeds in m/s, turn rate in rad/s, left positive."""
-    frames = round(CYCLES * shape.cycle_duration * FRAME_RATE)
+    # A multiple of four puts every strike on a frame, so that left and right are exact mirror images.
+    frames = 4 * round(CYCLES * shape.cycle_duration * FRAME_RATE / 4)
     cycle = frames / FRAME_RATE / CYCLES
     path = steady_path(forward, turn, side)
     shape = with_clearance(replace(shape, cycle_duration=cycle), path)
