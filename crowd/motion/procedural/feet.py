@@ -21,7 +21,7 @@ RootPath = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Times (F,) to root positions (F, 3), m, and headings (F,), rad."""
 
 END_STEP = 1e-3
-LIFT_RISE, LIFT_FALL = 2.6, 3.8
+LIFT_RISE, LIFT_FALL = 2.6, 3.1
 CLEARANCE = 0.012
 """Least height of a swinging foot, m (toe clearance of walking is 1 to 2 cm)."""
 TOE_STRAIGHTENING = 0.18
