@@ -1,7 +1,7 @@
 """Sample key frames, blend them by weights, and mix the result onto a pose. Joints are the lanes.
 
-A *pose row* holds the local rotations of one character or key frame: 256 float32, the quaternion components w,
-x, y, z outermost, each over 64 joints of which the last ones may be padding.
+A *pose row* holds the local rotations of one character or key frame: 256 float32, the quaternion components
+w, x, y, z outermost, each over 64 joints of which the last ones may be padding.
 """
 
 from typing import Any
@@ -249,9 +249,9 @@ def blend_samples(
     Notes
     -----
     **Source:** Feng, Xu, Shapiro, section 4.1, blending of sub-motions by barycentric weights.
-    **Differs from the source:** normalised weighted sums of sign-aligned quaternions in a fixed order, instead
-    of sequential spherical interpolation that depends on the order. A sum of opposite rotations that cancels
-    gives the rest pose of that joint.
+    **Differs from the source:** normalised weighted sums of sign-aligned quaternions in a fixed order, in
+    place of sequential spherical interpolation, whose result depends on the order. Where opposite rotations
+    cancel, the joint is at rest.
     """
     count = active.shape[0]
     for k in prange(CHUNKS):

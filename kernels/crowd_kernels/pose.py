@@ -190,7 +190,9 @@ def scatter_block(block: Any, length: int, active: Any, first: int, spare: Any, 
     """
     last = active.shape[0] - 1
     part = 4 * length
-    deinterleave(block, part, spare[:part], spare[part : 2 * part], spare[2 * part : 3 * part], spare[3 * part :])
+    deinterleave(
+        block, part, spare[:part], spare[part : 2 * part], spare[2 * part : 3 * part], spare[3 * part :]
+    )
     for stream in range(4):
         deinterleave(
             spare[stream * part : (stream + 1) * part],

@@ -1,11 +1,24 @@
-"""Quaternions (w, x, y, z) and vectors as tuples, for scalar code inside kernels."""
+"""Rotations as tuples (w, x, y, z), for scalar code inside kernels. Angles in rad; float64.
+
+Arguments named `q`, `a` and `b` are unit quaternions unless stated otherwise; `q` and `-q` are one rotation.
+"""
 
 import math
 
 from crowd_kernels._jit import kernel
+from crowd_kernels.vector import Vector as Vector
+from crowd_kernels.vector import add as add
+from crowd_kernels.vector import cross as cross
+from crowd_kernels.vector import dot as dot
+from crowd_kernels.vector import norm as norm
+from crowd_kernels.vector import scaled as scaled
+from crowd_kernels.vector import subtract as subtract
 
 Quaternion = tuple[float, float, float, float]
-Vector = tuple[float, float, float]
+
+TINY_SQUARE = 1e-30
+SMALL_ANGLE = 1e-8
+OPPOSITE = 1e-14
 
 
 @kernel
@@ -21,13 +34,13 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 @kernel
 def conjugate(q: Quaternion) -> Quaternion:
-    """Invert a unit rotation."""
+    """Invert a rotation."""
     return q[0], -q[1], -q[2], -q[3]
 
 
 @kernel
 def rotate(q: Quaternion, v: Vector) -> Vector:
-    """Rotate a vector by a unit quaternion."""
+    """Rotate a vector."""
     tx = 2.0 * (q[2] * v[2] - q[3] * v[1])
     ty = 2.0 * (q[3] * v[0] - q[1] * v[2])
     tz = 2.0 * (q[1] * v[1] - q[2] * v[0])
@@ -40,9 +53,9 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
 
 @kernel
 def normalized(q: Quaternion) -> Quaternion:
-    """Scale to unit length; the zero quaternion becomes the identity."""
+    """Scale a quaternion of any length to unit length; the zero quaternion becomes the identity."""
     square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
-    if not square > 1e-30:
+    if not square > TINY_SQUARE:
         return 1.0, 0.0, 0.0, 0.0
     scale = 1.0 / math.sqrt(square)
     return q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale
@@ -56,29 +69,115 @@ def from_yaw(yaw: float) -> Quaternion:
 
 @kernel
 def yaw_of(q: Quaternion) -> float:
-    """Find the twist of a rotation about +y, rad in (-pi, pi]."""
+    """Find the twist of a rotation about +y, rad in [-pi, pi]; 0 where it has none."""
     sign = 1.0 if q[0] >= 0.0 else -1.0
     return 2.0 * math.atan2(sign * q[2], sign * q[0])
 
 
 @kernel
+def from_axis_angle(axis: Vector, angle: float) -> Quaternion:
+    """Rotate about an axis of any nonzero length by `angle` rad; the zero axis gives the identity."""
+    length = norm(axis)
+    if not length > 0.0:
+        return 1.0, 0.0, 0.0, 0.0
+    scale = math.sin(0.5 * angle) / length
+    return math.cos(0.5 * angle), axis[0] * scale, axis[1] * scale, axis[2] * scale
+
+
+@kernel
+def from_rotation_vector(v: Vector) -> Quaternion:
+    """Rotate about the direction of a vector by its length in rad.
+
+    Parameters
+    ----------
+    v : tuple of float
+        Rotation vector, rad.
+
+    Returns
+    -------
+    tuple of float
+        Unit quaternion.
+
+    Notes
+    -----
+    **Source:** exponential map (Grassia, "Practical parameterization of rotations using the exponential map",
+    1998), with the limit at zero.
+    """
+    angle = norm(v)
+    if angle < SMALL_ANGLE:
+        return normalized((1.0, 0.5 * v[0], 0.5 * v[1], 0.5 * v[2]))
+    scale = math.sin(0.5 * angle) / angle
+    return math.cos(0.5 * angle), v[0] * scale, v[1] * scale, v[2] * scale
+
+
+@kernel
+def rotation_vector(q: Quaternion) -> Vector:
+    """Find axis times angle of a rotation, the inverse of `from_rotation_vector`.
+
+    Parameters
+    ----------
+    q : tuple of float
+        Unit quaternion of either sign.
+
+    Returns
+    -------
+    tuple of float
+        Rotation vector of length 0 to pi, rad.
+
+    Notes
+    -----
+    **Source:** logarithmic map, with the arc tangent of half the angle, which is exact for small ones.
+    """
+    sign = 1.0 if q[0] >= 0.0 else -1.0
+    axis = (sign * q[1], sign * q[2], sign * q[3])
+    sine = norm(axis)
+    if sine < SMALL_ANGLE:
+        return scaled(axis, 2.0)
+    return scaled(axis, 2.0 * math.atan2(sine, sign * q[0]) / sine)
+
+
+@kernel
 def between(a: Vector, b: Vector) -> Quaternion:
-    """Find the shortest rotation that takes direction `a` to direction `b`; both of any nonzero length."""
-    length = math.sqrt((a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) * (b[0] * b[0] + b[1] * b[1] + b[2] * b[2]))
-    w = length + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    if not w > 1e-9 * length:
-        # Opposite directions: half a turn about any axis across `a`.
+    """Find the shortest rotation that takes direction `a` to direction `b`.
+
+    Parameters
+    ----------
+    a, b : tuple of float
+        Vectors of any nonzero length.
+
+    Returns
+    -------
+    tuple of float
+        Unit quaternion; half a turn about some axis across `a` for opposite directions, the identity where a
+        length is zero.
+    """
+    length = math.sqrt(dot(a, a) * dot(b, b))
+    w = length + dot(a, b)
+    if not w > OPPOSITE * length:
         if abs(a[0]) > abs(a[2]):
             return normalized((0.0, -a[1], a[0], 0.0))
         return normalized((0.0, 0.0, -a[2], a[1]))
-    return normalized((w, a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
+    x, y, z = cross(a, b)
+    return normalized((w, x, y, z))
 
 
 @kernel
 def nlerp(a: Quaternion, b: Quaternion, weight: float) -> Quaternion:
-    """Mix two rotations the short way: `a` at weight 0, `b` at 1."""
-    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    other = weight if dot >= 0.0 else -weight
+    """Mix two rotations the short way along a chord: `a` at weight 0, `b` at 1.
+
+    Parameters
+    ----------
+    a, b : tuple of float
+    weight : float
+        0 to 1.
+
+    Returns
+    -------
+    tuple of float
+        Unit quaternion.
+    """
+    cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    other = weight if cosine >= 0.0 else -weight
     own = 1.0 - weight
     return normalized(
         (
@@ -91,36 +190,50 @@ def nlerp(a: Quaternion, b: Quaternion, weight: float) -> Quaternion:
 
 
 @kernel
-def add(a: Vector, b: Vector) -> Vector:
-    """Add two vectors."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+def slerp(a: Quaternion, b: Quaternion, weight: float) -> Quaternion:
+    """Mix two rotations the short way at constant angular velocity: `a` at weight 0, `b` at 1.
+
+    Parameters
+    ----------
+    a, b : tuple of float
+    weight : float
+        0 to 1; values outside go on along the same great circle.
+
+    Returns
+    -------
+    tuple of float
+        Unit quaternion.
+
+    Notes
+    -----
+    **Source:** Shoemake, "Animating rotation with quaternion curves", 1985.
+    **Differs from the source:** written as a share of the rotation vector, which is exact for small angles.
+    """
+    way = rotation_vector(multiply(b, conjugate(a)))
+    return multiply(from_rotation_vector(scaled(way, weight)), a)
 
 
 @kernel
-def subtract(a: Vector, b: Vector) -> Vector:
-    """Subtract `b` from `a`."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+def swing_twist_y(q: Quaternion) -> tuple[Quaternion, Quaternion]:
+    """Split a rotation into a twist about +y and the swing that follows it.
 
+    Parameters
+    ----------
+    q : tuple of float
+        Unit quaternion.
 
-@kernel
-def scaled(a: Vector, factor: float) -> Vector:
-    """Multiply a vector by a number."""
-    return a[0] * factor, a[1] * factor, a[2] * factor
+    Returns
+    -------
+    swing : tuple of float
+        Rotation about a horizontal axis.
+    twist : tuple of float
+        Rotation about +y by `yaw_of(q)`; `multiply(swing, twist)` is `q`. The identity where the y axis is
+        turned upside down and the twist is not determined.
 
-
-@kernel
-def dot(a: Vector, b: Vector) -> float:
-    """Find the scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def cross(a: Vector, b: Vector) -> Vector:
-    """Find the vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
-def norm(a: Vector) -> float:
-    """Find the length."""
-    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    Notes
+    -----
+    **Source:** Dobrowolski, "Swing-twist decomposition in Clifford algebra", 2015.
+    """
+    sign = 1.0 if q[0] >= 0.0 else -1.0
+    twist = normalized((sign * q[0], 0.0, sign * q[2], 0.0))
+    return multiply(q, conjugate(twist)), twist

@@ -1,4 +1,4 @@
-"""Slow twins of `crowd_kernels.clip` and `crowd_kernels.pose`: one joint at a time with rotation matrices."""
+"""Slow twins of `crowd_kernels.pose`: one joint at a time with rotation matrices."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -7,37 +7,29 @@ PADDED = 64
 
 
 def row_to_quaternions(row):
+    """Quaternions (64, 4) of a pose row."""
     return np.asarray(row, float).reshape(4, PADDED).T
 
 
 def quaternions_to_row(quaternions):
+    """Pose row of (J, 4) quaternions."""
     row = np.zeros((4, PADDED), np.float32)
     row[0] = 1
     row[:, : len(quaternions)] = np.asarray(quaternions).T
     return row.ravel()
 
 
-def blend(keys, frame, next_frame, fraction, weight):
-    """Weighted sum of (row or vector) keys."""
-    total = 0
-    for a, b, f, w in zip(frame, next_frame, fraction, weight, strict=True):
-        total = total + w * ((1 - f) * keys[a].astype(float) + f * keys[b].astype(float))
-    return total
-
-
-def mix(pose, rotation, share):
-    """Mix (J, 4) rotations onto a pose by (J,) shares, the short way."""
-    mixed = []
-    for old, new, s in zip(pose, rotation, share, strict=True):
-        new = new / np.linalg.norm(new)
-        if old @ new < 0:
-            new = -new
-        both = (1 - s) * old + s * new
-        mixed.append(both / np.linalg.norm(both))
-    return np.array(mixed)
+def random_rows(rng, count, joint_count):
+    """Pose rows of random rotations up to about a right angle."""
+    rows = []
+    for _ in range(count):
+        quaternions = rng.normal(0, 0.4, (joint_count, 4)) + np.array([1, 0, 0, 0])
+        rows.append(quaternions_to_row(quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)))
+    return np.array(rows, np.float32).reshape(count, 4 * PADDED)
 
 
 def matrix(q):
+    """Matrix of a quaternion."""
     return Rotation.from_quat([q[1], q[2], q[3], q[0]]).as_matrix()
 
 
