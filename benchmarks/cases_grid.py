@@ -70,13 +70,19 @@ def search_for(queries: Queries) -> Search:
 def search(data: Search) -> None:
     """Find all ways."""
     data.generation += 2 * len(data.status) + 2
+    cost, arrival, stamp, head, following, entry = data.scratch
     search_ways(
         data.mask,
         data.columns,
         data.queries.start,
         data.queries.goal,
         data.generation,
-        *data.scratch,
+        cost,
+        arrival,
+        stamp,
+        head,
+        following,
+        entry,
         data.status,
         data.length,
         data.expansions,

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 if TYPE_CHECKING:
+    from crowd.compilation import warm_up
     from crowd.errors import CrowdError
     from crowd.metrics import Metrics, measure
     from crowd.recording import Recorder, Recording
     from crowd.scenario import Scenario, load_scenario
     from crowd.simulation import Frame, Simulation
-    from crowd.compilation import warm_up
 
 __all__ = [
     "CrowdError",

@@ -64,7 +64,9 @@ class Commands:
                 raise SettingsError(
                     describe("set_goal", f"character {row} finds no way to its goal", goal[[0, 2]].tolist())
                 )
-        simulation.population.send(simulation.state, rows, np.ascontiguousarray(goals), radius)
+        simulation.population.send(
+            simulation.state, rows, np.ascontiguousarray(goals), np.full(rows.size, radius)
+        )
 
     def set_locomotion(self, characters: Characters, parameters: npt.ArrayLike) -> None:
         """Command forward speed, turn rate and side speed directly; steering is ignored until `release`.

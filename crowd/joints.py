@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from crowd.controllers.controller import IntArray
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.people import People
-from crowd.state import Float32Array, FloatArray, State
+from crowd.state import Float32Array, FloatArray, IntArray, State
 from crowd_kernels.pose import CHUNKS, kinematics, scratch_length
 
 

@@ -181,7 +181,10 @@ class BodyMetrics:
         if len(rows) == 0:
             return
         (asked, _), gap = frame.obstacles.query_nearest(
-            shapely.points(position), max_distance=float(radius.max()), return_distance=True, all_matches=False
+            shapely.points(position),
+            max_distance=float(radius.max()),
+            return_distance=True,
+            all_matches=False,
         )
         if len(asked):
             self._deepest_wall = max(self._deepest_wall, float((radius[asked] - gap).max()))
@@ -237,7 +240,9 @@ class FootMetrics:
         fresh = began & ((self._contact == 0) | (frame.spawn_count != self._spawn)[:, None])
         self._total[fresh] = 0.0
         self._since[fresh] = frame.time
-        point = np.where((contact == 1)[..., None], frame.foot_point_world[:, :, 0], frame.foot_point_world[:, :, 1])
+        point = np.where(
+            (contact == 1)[..., None], frame.foot_point_world[:, :, 0], frame.foot_point_world[:, :, 1]
+        )
         here = point[..., [0, 2]]
         self._anchor[began] = here[began]
         self._latest = here
@@ -274,6 +279,17 @@ class MotionMetrics:
 
     def __init__(self) -> None:
         self._begin: float | None = None
+        self._time = 0.0
+        self._position: FloatArray = np.zeros((0, 3))
+        self._yaw: FloatArray = np.zeros(0)
+        self._spawn: npt.NDArray[np.integer[Any]] = np.zeros(0, np.int64)
+        self._path: FloatArray = np.zeros(0)
+        self._turn: FloatArray = np.zeros(0)
+        self._asked_path: FloatArray = np.zeros(0)
+        self._asked_turn: FloatArray = np.zeros(0)
+        self._lowest: FloatArray = np.zeros((0, 3))
+        self._highest: FloatArray = np.zeros((0, 3))
+        self._is_steady: BoolArray = np.zeros(0, np.bool_)
         self._windows = 0
         self._speed_windows = 0
         self._speed_square = 0.0
@@ -333,7 +349,9 @@ class MotionMetrics:
         if self._speed_windows:
             result["locomotion.speed_rms_relative"] = float(np.sqrt(self._speed_square / self._speed_windows))
         if self._windows:
-            result["locomotion.turn_rms_deg_s"] = float(np.degrees(np.sqrt(self._turn_square / self._windows)))
+            result["locomotion.turn_rms_deg_s"] = float(
+                np.degrees(np.sqrt(self._turn_square / self._windows))
+            )
             result["locomotion.windows"] = self._windows
         return result
 
@@ -363,7 +381,9 @@ def measure(recording: Recording | str | os.PathLike[str]) -> dict[str, float | 
         with Recording(recording) as opened:
             return measure(opened)
     metrics = Metrics()
-    lines = shapely.linestrings(recording.walls[:, :, [0, 2]]) if len(recording.walls) else np.zeros(0, object)
+    lines = (
+        shapely.linestrings(recording.walls[:, :, [0, 2]]) if len(recording.walls) else np.zeros(0, object)
+    )
     present: BoolArray | None = None
     for time, fields in recording.frames():
         is_there = (recording.wall_appear_at <= time) & (time < recording.wall_disappear_at)

@@ -54,8 +54,8 @@ class People:
 
         Notes
         -----
-        Cadence scales by one over the square root of leg length (dynamic similarity, Alexander 1984); a person
-        keeps a personal tempo within 3 %.
+        Cadence scales by one over the square root of leg length (dynamic similarity, Alexander 1984), and
+        everyone has a tempo of their own within 3 %.
         """
         count = radius.shape[0]
         segment_scale = draw_segment_scale(skeleton, stature, seed)

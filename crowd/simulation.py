@@ -14,7 +14,7 @@ from crowd import checkpoint
 from crowd.checkpoint import Stateful
 from crowd.commands import Commands
 from crowd.controllers.animation import Animation
-from crowd.controllers.controller import Controller, IntArray, Step
+from crowd.controllers.controller import Controller, Step
 from crowd.controllers.foot_lock import FootLock
 from crowd.controllers.idle import Idle
 from crowd.controllers.locomotion import Locomotion
@@ -27,7 +27,7 @@ from crowd.motion.library import MotionLibrary
 from crowd.navigation.navigator import Navigator, avoidance_settings
 from crowd.population import Population
 from crowd.scenario import Scenario
-from crowd.state import Float32Array, FloatArray, State
+from crowd.state import Float32Array, FloatArray, IntArray, State
 from crowd_kernels import _jit
 
 SERIAL_BELOW = 200

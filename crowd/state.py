@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from crowd.motion.clip_table import PADDED_JOINTS
+from crowd_kernels.clip import PADDED_JOINTS
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]

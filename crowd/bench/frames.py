@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from crowd.compilation import warm_up
-from crowd.scenario.schema import Area, Goal, Region, Scenario, WorldTable
+from crowd.scenario.schema import Area, Goal, Region, Scenario, Spread, WorldTable
 from crowd.simulation import Simulation, thread_count
 
 SCENES = ("standing", "walking_open", "walking_dense")
@@ -60,7 +60,7 @@ def scene(name: str, characters: int) -> Scenario:
         arrangement="grid" if name == "walking_dense" else "random",
         spacing=0.02,
         facing="random",
-        radius={"min": BODY_RADIUS, "max": BODY_RADIUS},
+        radius=Spread(min=BODY_RADIUS, max=BODY_RADIUS),
         goals=(Goal(area=square, radius=0.8),) if walks else (),
         repeat=walks,
     )

@@ -1,7 +1,6 @@
 """Tables, JSON and comparison of benchmark results."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -42,7 +41,7 @@ def write_results(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     partial = path.with_name(path.name + ".partial")
     try:
         partial.write_text(json.dumps(list(rows), indent=1) + "\n", encoding="utf-8")
-        os.replace(partial, path)
+        partial.replace(path)
     except OSError as error:
         partial.unlink(missing_ok=True)
         raise SettingsError(describe(str(path), "cannot be written", error.strerror)) from error
@@ -51,7 +50,7 @@ def write_results(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 def print_frames(rows: Sequence[Mapping[str, Any]], earlier: Sequence[Mapping[str, Any]] = ()) -> list[str]:
     """Print the table of frames per second; returns one line for each regression against earlier results."""
     before = {(row["case"], row["characters"], row["threads"]): row for row in earlier}
-    stages = [stage for stage in rows[0]["stages"]] if rows else []
+    stages = list(rows[0]["stages"]) if rows else []
     table = Table(box=None, pad_edge=False)
     for title in ("scene", "people", "threads", "fps", "us/person", *stages, "MB", "ok"):
         table.add_column(title, justify="left" if title == "scene" else "right", no_wrap=True)

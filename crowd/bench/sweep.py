@@ -240,7 +240,7 @@ def transitions(
 
 
 def largest_acceleration(rotations: npt.NDArray[np.floating], rate: float) -> float:
-    """Largest angular acceleration of (frame, person, joint, 4) unit quaternions at `rate` frames a second."""
+    """Largest angular acceleration of (frame, person, joint, 4) unit quaternions, `rate` frames a second."""
     before, after = rotations[:-1].astype(np.float64), rotations[1:].astype(np.float64)
     w = (before * after).sum(axis=-1)
     vector = (

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from crowd.controllers.controller import IntArray, KeySamples, Step
-from crowd.state import State
+from crowd.controllers.controller import KeySamples, Step
+from crowd.state import IntArray, State
 from crowd_kernels.layers import play_crowd
 
 

@@ -105,9 +105,9 @@ class FootLock:
 
 def leg_arrays(skeleton: Skeleton) -> LegArrays:
     """Both legs of a skeleton for the kernel."""
+    parts = ("thigh", "shank", "foot", "toe")
     joints = np.array(
-        [[skeleton.joint(f"{side}_{part}") for part in ("thigh", "shank", "foot", "toe")] for side in ("right", "left")],
-        np.int32,
+        [[skeleton.joint(f"{side}_{part}") for part in parts] for side in ("right", "left")], np.int32
     )
     sole = np.zeros((2, 3, 3))
     for leg, (thigh, shank, foot, toe) in enumerate(joints):

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from crowd.controllers.controller import IntArray, KeySamples, Step
-from crowd.state import State
+from crowd.controllers.controller import KeySamples, Step
+from crowd.state import IntArray, State
 from crowd_kernels.layers import idle_crowd
 
 

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from crowd.controllers.controller import IntArray, KeySamples, Step
-from crowd.state import FloatArray, State
+from crowd.controllers.controller import KeySamples, Step
+from crowd.state import FloatArray, IntArray, State
 from crowd_kernels.barycentric import locate_crowd
 from crowd_kernels.gait import contact_crowd, sample_crowd
 from crowd_kernels.locomotion import (

@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from crowd.controllers.controller import IntArray, Step
-from crowd.state import State
+from crowd.controllers.controller import Step
+from crowd.state import IntArray, State
 from crowd_kernels.locomotion import integrate_root_crowd
 
 

@@ -11,8 +11,8 @@ FloatArray = npt.NDArray[np.float64]
 STATURE = 1.75
 
 # Segment lengths as shares of stature: Drillis and Contini 1966, as printed in Winter, "Biomechanics and
-# motor control of human movement". Trunk joints are spread over hip to shoulder, 0.288; joint centres of hips and
-# shoulders lie inside the surface breadths.
+# motor control of human movement". Trunk joints are spread over hip to shoulder, 0.288; joint
+# centres of hips and shoulders lie inside the surface breadths.
 THIGH, SHANK, ANKLE_HEIGHT = 0.245, 0.246, 0.039
 UPPER_ARM, FOREARM, HAND = 0.186, 0.146, 0.108
 HALF_HIP, HALF_SHOULDER = 0.050, 0.106
@@ -166,8 +166,8 @@ def draw_segment_scale(skeleton: Skeleton, stature: FloatArray, seed: int) -> np
     Returns
     -------
     (N, 8) float32
-        Scale of joint offsets by `Segment`. Legs that are longer than usual come with a shorter trunk, so that
-        stature is kept.
+        Scale of joint offsets by `Segment`. Longer legs than usual come with a shorter trunk, so that stature
+        is kept.
     """
     count = len(stature)
     scale = np.repeat((stature / skeleton.stature)[:, None], len(Segment), axis=1)

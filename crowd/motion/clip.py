@@ -10,7 +10,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 TOE_ROLL = 0.05
-"""Share of a cycle between the lift of the ball of the foot and toe off; only the tip touches the ground then."""
+"""Share of a cycle between the lift of the ball of the foot and toe off; then only the tip is down."""
 
 
 class FootEvent(IntEnum):

@@ -1,4 +1,4 @@
-"""Clips packed for the kernels: one table of key frames, with everything that is needed to find the right row."""
+"""Clips packed for the kernels: one table of key frames, and where to find each of them."""
 
 from dataclasses import dataclass
 
@@ -170,7 +170,7 @@ def phase_times(clip: Clip, phase: FloatArray) -> FloatArray:
 
 
 def contact_phases(clip: Clip) -> FloatArray:
-    """Shares of a cycle from strike to foot flat and to the lift of the ball, for right and left foot; (2, 2)."""
+    """Shares of a cycle from strike to foot flat and to the lift of the ball, right and left; (2, 2)."""
     times = strike_times(clip)
     knots, phases = np.append(times, times[1:] + clip.duration), np.arange(9) * 0.5
     result = np.zeros((2, 2))

@@ -25,14 +25,14 @@ def multiply(first: FloatArray, second: FloatArray) -> FloatArray:
 
 def conjugate(rotation: FloatArray) -> FloatArray:
     """Invert unit rotations (..., 4)."""
-    return rotation * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.asarray(rotation * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def rotate(rotation: FloatArray, vector: npt.ArrayLike) -> FloatArray:
     """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
-    axis = rotation[..., 1:]
-    twice = 2.0 * np.cross(axis, np.asarray(vector, dtype=np.float64))
-    return np.asarray(vector + rotation[..., :1] * twice + np.cross(axis, twice))
+    axis, start = rotation[..., 1:], np.asarray(vector, dtype=np.float64)
+    twice = 2.0 * np.cross(axis, start)
+    return np.asarray(start + rotation[..., :1] * twice + np.cross(axis, twice))
 
 
 def about(axis: int, angle: npt.ArrayLike) -> FloatArray:

@@ -4,13 +4,11 @@ from typing import Any
 
 import numpy as np
 
-
 from crowd.controllers.controller import Step
 from crowd.model import Model
 from crowd.navigation.avoidance import Avoidance, AvoidanceSettings
 from crowd.navigation.patience import Patience
 from crowd.navigation.routing import Routing, RoutingSettings
-
 from crowd.scenario import PlacedCharacters, Scenario
 from crowd.state import FloatArray
 from crowd_kernels.locomotion import prefer_crowd

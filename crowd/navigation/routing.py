@@ -201,7 +201,7 @@ class Routing:
                 )
 
     def _start_cells(self, grid: Grid, points: FloatArray, goal_cell: IntArray) -> IntArray:
-        """Cells from which to start: nearest ones of the goal's part of the grid; -1 where that is far off."""
+        """Cells from which to start: nearest ones in the goal's part; -1 where that is far off."""
         cells = grid.nearest_cells(points)
         cells[goal_cell < 0] = -1
         known = np.maximum(goal_cell, 0)
@@ -215,12 +215,17 @@ class Routing:
         return cells
 
     def _search_ways(
-        self, grid: Grid, characters: IntArray, start_cell: IntArray, goal_cell: IntArray, position_world: FloatArray
+        self,
+        grid: Grid,
+        characters: IntArray,
+        start_cell: IntArray,
+        goal_cell: IntArray,
+        position_world: FloatArray,
     ) -> None:
         """Find own ways by A*."""
         if characters.size == 0:
             return
-        scratch = self._search.arrays(grid)
+        cost, arrival, stamp, head, following, entry = self._search.arrays(grid)
         route_by_search(
             grid_arrays(grid),
             characters,
@@ -229,7 +234,12 @@ class Routing:
             position_world,
             self.goal_world,
             self._search.next_generation(characters.size),
-            *scratch,
+            cost,
+            arrival,
+            stamp,
+            head,
+            following,
+            entry,
             self._search.cells(grid),
             self.corner,
             self.rest,
@@ -245,7 +255,11 @@ class Routing:
             entries = 4 * grid.layout.cell_count + 8
             goals = np.array([goal_cell], np.int32)
             while True:
-                queue = (np.zeros(BUCKETS, np.int32), np.zeros(entries, np.int32), np.zeros(entries, np.int32))
+                queue = (
+                    np.zeros(BUCKETS, np.int32),
+                    np.zeros(entries, np.int32),
+                    np.zeros(entries, np.int32),
+                )
                 if fill_field(grid.mask, grid.layout.columns, goals, *queue, cost) != OVERFLOW:
                     break
                 entries *= 2

@@ -91,7 +91,8 @@ class World:
 
     def is_walkable(self, points_world: FloatArray, radius: float) -> BoolArray:
         """At which points (P, 3) a body fits."""
-        return self.is_inside_bounds(points_world) & (self.clearance_at(points_world) >= radius - 1e-6)
+        has_room = self.clearance_at(points_world) >= radius - 1e-6
+        return np.logical_and(self.is_inside_bounds(points_world), has_room)
 
     def nearest_walkable(self, points_world: FloatArray, radius: float) -> FloatArray:
         """The points (P, 3) themselves where a body fits, else the nearest places of the grid."""
@@ -108,7 +109,8 @@ class World:
         grid = self.grid(radius)
         starts = grid.nearest_cells(start_world[:, [0, 2]])
         goals = grid.nearest_cells(goal_world[:, [0, 2]])
-        return (starts >= 0) & (goals >= 0) & (grid.component[starts] == grid.component[goals])
+        is_one_part = grid.component[starts] == grid.component[goals]
+        return np.asarray((starts >= 0) & (goals >= 0) & is_one_part, np.bool_)
 
     def _refresh(self) -> None:
         """Rebuild what depends on obstacles; grids are made again when they are asked for."""

@@ -58,7 +58,7 @@ def smoother(progress: FloatArray) -> FloatArray:
 
 
 def stance_pitch(shape: GaitShape, share: FloatArray) -> FloatArray:
-    """Rise of the toes over a stance, negative once the heel rises, rad; `share` of a cycle since the strike."""
+    """Rise of the toes over a stance, negative once the heel rises, rad; `share` since the strike."""
     strike = shape.strike_pitch * (1.0 - smoother(share / shape.flat)) if shape.flat > 0.0 else 0.0 * share
     progress = np.clip((share - shape.heel_off) / (shape.stance - shape.heel_off), 0.0, None)
     return np.asarray(strike - shape.toe_off_pitch * progress ** (1.0 + shape.rise_power))
@@ -117,7 +117,7 @@ def lift_curve(progress: FloatArray) -> FloatArray:
 
 
 def with_clearance(shape: GaitShape, root: RootPath) -> GaitShape:
-    """Raise the lift of a gait until no part of a swinging foot comes closer to the ground than `CLEARANCE`."""
+    """Raise the lift of a gait until a swinging foot keeps `CLEARANCE` from the ground."""
     time = np.linspace(0.0, shape.cycle_duration, 121)
     share = time / shape.cycle_duration
     is_free = (share > shape.stance + TOE_ROLL + 0.06) & (share < 0.84)

@@ -77,7 +77,7 @@ class GaitShape:
 
 
 QUICK_STEPS = 0.95
-"""Steps are this much shorter than the mean law (which is good to 7 %), which spares the legs their last stretch."""
+"""Steps against the mean law, which is good to 7 %; shorter ones spare the legs their last stretch."""
 
 
 def walk_cycle(speed: float) -> float:
@@ -88,7 +88,7 @@ def walk_cycle(speed: float) -> float:
 
 
 def walk_stance(speed: float, cycle: float) -> float:
-    """Stance share of walking: mean of Boulic et al. 1990 and Kirtley et al. 1985, until the ball lifts off."""
+    """Stance share of walking until the ball lifts: mean of Boulic et al. 1990 and Kirtley et al. 1985."""
     return 0.5 * ((0.752 * cycle - 0.143) / cycle + (64.2 - 3.5 * speed) / 100.0) - 0.02 - TOE_ROLL
 
 
@@ -102,12 +102,13 @@ def run_stance(speed: float, cycle: float) -> float:
 
     Fast runs are a little shorter on the ground, because the root keeps a constant speed.
     """
-    return 0.425 * speed**-0.45 / cycle - 0.012 * (speed - 2.0) - TOE_ROLL
+    contact: float = 0.425 * math.pow(speed, -0.45)
+    return contact / cycle - 0.012 * (speed - 2.0) - TOE_ROLL
 
 
-# Shape numbers that bring hip, knee and ankle of the planned legs closest to the published curves: Koopman et al.
-# 2014 for walking, the mean runner of the BMC group for running. Columns:
-# flat, heel_off / stance, strike_pitch deg, toe_off_pitch deg, rise_power, ankle_ahead m, lift m, pelvis_height m.
+# Shape numbers fitted so that hip, knee and ankle come close to the published curves: Koopman et al. 2014 for
+# walking, the mean runner of the BMC group for running. Columns: flat, heel_off / stance, strike_pitch deg,
+# toe_off_pitch deg, rise_power, ankle_ahead m, lift m, pelvis_height m.
 WALK_SPEEDS = (0.7, 1.0, 1.35, 1.9)
 WALK_FIT = np.array(
     [
@@ -257,6 +258,4 @@ def back_shape(speed: float) -> GaitShape:
     cycle = 0.88 * walk_cycle(speed)
     shape = flat_shape(cycle, walk_stance(speed, cycle), 0.14, 0.912, lift=0.045)
     swing = math.radians(0.5 * 9.88 * speed / HIP_HEIGHT)
-    return replace(
-        shape, arm_swing=swing, ankle_ahead=0.0, lean=math.radians(3.0)
-    )
+    return replace(shape, arm_swing=swing, ankle_ahead=0.0, lean=math.radians(3.0))
