@@ -1,4 +1,4 @@
-"""Who is in the scene: people enter, walk through their goal lists, wait, leave, and come back through flows."""
+"""Who is in the scene: people enter, walk through their goal lists, wait, leave, come back through flows."""
 
 from typing import Protocol
 
