@@ -1,4 +1,4 @@
-"""Clips packed for the kernels: one table of key frames, and where to find each of them."""
+"""Clips packed for the kernels: one table of key frames, and what it takes to find the right row."""
 
 from dataclasses import dataclass
 
@@ -19,6 +19,8 @@ IntArray = npt.NDArray[np.int32]
 KEYS_PER_CYCLE = 64
 KEY_RATE = 30.0
 """Keys per second of clips that are not locomotion."""
+SAME_TIME = 1e-6
+"""Events closer than this coincide, s."""
 SPINE_SHARES = {"spine_1": 0.25, "spine_2": 0.5, "spine_3": 0.8, "spine_4": 1.0}
 ARM_PARTS = ("clavicle", "upper_arm", "forearm", "hand", "thumb", "index", "middle", "ring", "little")
 HEAD_PARTS = ("neck_1", "neck_2", "head", "left_eye", "right_eye")
@@ -170,20 +172,23 @@ def phase_times(clip: Clip, phase: FloatArray) -> FloatArray:
 
 
 def contact_phases(clip: Clip) -> FloatArray:
-    """Shares of a cycle from strike to foot flat and to the lift of the ball, right and left; (2, 2)."""
+    """Shares of a cycle from strike to foot flat and to the lift of the ball, right and left foot; (2, 2).
+
+    A foot that lands flat, or on its toe, is flat from the strike on.
+    """
     times = strike_times(clip)
     knots, phases = np.append(times, times[1:] + clip.duration), np.arange(9) * 0.5
     result = np.zeros((2, 2))
     triples = ((FootEvent.RHS, FootEvent.RTS, FootEvent.RTO), (FootEvent.LHS, FootEvent.LTS, FootEvent.LTO))
     for foot, (strike, flat, toe_off) in enumerate(triples):
-        begins = [time for time, event in clip.foot_events if event is strike]
+        begins = np.array([time for time, event in clip.foot_events if event is strike])
         for column, wanted in enumerate((flat, toe_off)):
-            ends = [time for time, event in clip.foot_events if event is wanted]
-            shares = []
-            for begin in begins:
-                end = min(time + wrap for time in ends for wrap in (0, clip.duration) if time + wrap > begin)
-                shares.append(np.interp(end, knots, phases) - np.interp(begin, knots, phases))
-            result[foot, column] = np.mean(shares) - (TOE_ROLL if wanted is toe_off else 0.0)
+            found = np.array([time for time, event in clip.foot_events if event is wanted])
+            delays = np.mod(found - begins[:, None] + SAME_TIME, clip.duration).min(axis=1) - SAME_TIME
+            shares = np.interp(begins + delays, knots, phases) - np.interp(begins, knots, phases)
+            result[foot, column] = shares.mean() - (TOE_ROLL if wanted is toe_off else 0.0)
+    is_flat_at_once = (result[:, 0] < 0) | (result[:, 0] > result[:, 1])
+    result[is_flat_at_once, 0] = 0.0
     return result
 
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
 from crowd_kernels.triangle import nearest_on_triangle
 
 CHUNKS = 32
@@ -49,13 +49,13 @@ class SpaceArrays(NamedTuple):
     """Tetrahedra that touch each cell."""
 
 
-@kernel
+@inlined_kernel
 def scaled(value: float, scale: float) -> float:
     """Divide by a scale and bring what is far nearer, so that squares stay finite."""
     return min(max(value / scale, -FARTHEST), FARTHEST)
 
 
-@kernel
+@inlined_kernel
 def simplex_weights(
     simplex: Any, inverse: Any, example: Any, number: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
@@ -70,7 +70,7 @@ def simplex_weights(
     return a, b, c, 1.0 - a - b - c
 
 
-@kernel
+@inlined_kernel
 def find_simplex(
     simplex: Any,
     inverse: Any,

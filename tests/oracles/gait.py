@@ -1,15 +1,20 @@
-"""Slow twins of `crowd_kernels.gait`."""
+"""Slow twins of `crowd_kernels.gait`: one character at a time, with the words of the definition."""
+
+import math
 
 
-def key_at(phase, key_count):
-    """Key before, key after and share between them at a phase in [0, 2)."""
-    position = phase / 2 * key_count
-    key = min(int(position), key_count - 1)
-    return key, (key + 1) % key_count, position - key
+def key_position(first_key, key_count, phase):
+    """Key before, key after and place between them for a clip whose keys are uniform over two cycles."""
+    position = (phase % 2.0) / 2.0 * key_count
+    before = math.floor(position) % key_count
+    return first_key + before, first_key + (before + 1) % key_count, position - math.floor(position)
 
 
-def contact(contact_phase, weight, phase, foot):
-    """Contact of one foot: weighted events of its examples (4, 2) against the time since its strike."""
-    since = (phase - 0.5 * foot) % 1.0
-    flat, lift = (weight[:, None] * contact_phase).sum(axis=0)
-    return 1 if since < flat else 2 if since < lift else 0
+def contact(contact_phase, example, weight, phase, foot):
+    """What of a foot is planted: the blend's own events are the weighted means of the examples' events."""
+    flat = sum(w * contact_phase[e][foot][0] for e, w in zip(example, weight, strict=True))
+    lift = sum(w * contact_phase[e][foot][1] for e, w in zip(example, weight, strict=True))
+    since_strike = (phase - (0.0, 0.5)[foot]) % 1.0
+    if since_strike < flat:
+        return "heel"
+    return "ball" if since_strike < lift else "swing"
