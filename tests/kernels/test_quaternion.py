@@ -95,6 +95,14 @@ def test_positive_yaw_turns_from_ahead_to_the_left(yaw):
 
 
 @given(quaternions)
+def test_yaw_does_not_depend_on_the_sign_and_is_at_most_half_a_turn(q):
+    assume(math.hypot(q[0], q[2]) > 1e-6 and abs(q[0]) > 1e-9)
+    yaw = kernels.yaw_of(q)
+    assert abs(yaw) <= math.pi
+    assert kernels.yaw_of(tuple(-c for c in q)) == pytest.approx(yaw, abs=1e-12)
+
+
+@given(quaternions)
 def test_swing_after_twist_is_the_rotation(q):
     swing, twist = kernels.swing_twist_y(q)
     assert close(kernels.multiply(swing, twist), q)
@@ -124,6 +132,12 @@ def test_between_turns_one_direction_to_the_other_by_their_angle(a, b):
 def test_between_opposite_directions_is_half_a_turn(a):
     q = kernels.between(a, tuple(-c for c in a))
     np.testing.assert_allclose(kernels.rotate(q, a), np.negative(a), atol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_between_nearly_opposite_directions_still_meets_the_other(gap):
+    a, b = (0.0, 0.0, 2.0), (math.sin(gap), 0.0, -math.cos(gap))
+    np.testing.assert_allclose(kernels.rotate(kernels.between(a, b), unit(a)), b, atol=1e-6)
 
 
 def test_between_nothing_is_no_rotation():

@@ -86,3 +86,12 @@ def test_callers_hold_their_leaves_and_count_no_references(caller, signature):
     text = assembly(caller, signature)
     assert packed(text, r"mov[au]ps|mov[au]pd") >= 8
     assert "NRT_incref" not in text
+
+
+def test_kinematics_holds_the_arithmetic_of_a_joint():
+    cube = numba.float32[:, :, ::1]
+    text = assembly(
+        pose.kinematics_chunk,
+        (INDICES, ROWS, INDICES, INTEGER, ROWS, ROWS, ROWS, INDICES, INTEGER, INTEGER, ROW, cube, cube),
+    )
+    assert packed(text, "mulps|fmadd[0-9]+ps") >= 30
