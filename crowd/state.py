@@ -69,7 +69,7 @@ class State:
     heading_velocity_world: FloatArray = _array(3)
     """Smoothed desired velocity; the character turns towards it, m/s. (character, 3)"""
     turning_side: ByteArray = _array(dtype=np.int8)
-    """Side of the present turn: 1 left, -1 right; keeps a character that must turn round from wavering. (character,)"""
+    """Side of the present turn: 1 left, -1 right, so that nobody wavers who must turn round. (character,)"""
 
     is_directed: BoolArray = _array(dtype=np.bool_)
     """Locomotion parameters come from a command instead of steering. (character,)"""
@@ -95,7 +95,7 @@ class State:
     """Weights of the examples: all >= 0, sum 1. (character, 4)"""
 
     idle_clip: IntArray = _array(2, dtype=np.int32)
-    """Idle variation that is left and the one that is entered, as indices of the idle clips. (character, 2)"""
+    """Idle variation that is left and the one that is entered, among the idle clips. (character, 2)"""
     idle_time: FloatArray = _array(2)
     """Clip time of both, s. (character, 2)"""
     idle_mix: FloatArray = _array(fill=1)

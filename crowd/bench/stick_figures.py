@@ -76,7 +76,8 @@ def draw(simulation: Simulation, path: Path, eye: npt.ArrayLike, target: npt.Arr
             )
             axes.add_collection(lines)
         else:
-            axes.add_collection(PolyCollection(shapes, facecolors=colors, edgecolors="none", zorder=1 + order))
+            faces = PolyCollection(shapes, facecolors=colors, edgecolors="none", zorder=1 + order)
+            axes.add_collection(faces)
     try:
         figure.savefig(path, dpi=100)
     except (OSError, ValueError) as error:

@@ -98,8 +98,8 @@ class Grid:
     def build(cls, layout: Layout, tree: shapely.STRtree, radius: float) -> "Grid":
         """Find where a body fits.
 
-        A cell counts as walkable when the body fits somewhere in it, so that a gap is passed wherever the grid
-        lies. Between two such cells the straight way must be free as well, which keeps ways from passing
+        A cell counts as walkable when the body fits somewhere in it, so that a gap is passed wherever the
+        grid lies. Between two such cells the straight way must be free as well, which keeps ways from passing
         through thin walls and gaps that are too narrow.
         """
         centers = layout.centers()

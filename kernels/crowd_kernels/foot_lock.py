@@ -316,7 +316,8 @@ def lock_character(
             out_foot_point_world[character, leg, 0, 1],
             out_foot_point_world[character, leg, 0, 2],
         )
-        first, second, _ = bend_rotations(hip, knee, ankle, target, rotate(thigh, (1.0, 0.0, 0.0)), limits.stretch)
+        hinge = rotate(thigh, (1.0, 0.0, 0.0))
+        first, second, _ = bend_rotations(hip, knee, ankle, target, hinge, limits.stretch)
         new_thigh = normalized(multiply(first, thigh))
         new_shank = turned(first, second, shank)
         new_foot = normalized(multiply(from_yaw(yaw_offset[character, leg]), foot))
@@ -328,7 +329,8 @@ def lock_character(
             rotate(new_shank, scaled_offset(legs, leg, 2, scale)),
         )
         for point in range(2):
-            final = add(place, rotate(facing, add(ankle, rotate(new_foot, sole_point(legs, leg, point, scale)))))
+            final = add(ankle, rotate(new_foot, sole_point(legs, leg, point, scale)))
+            final = add(place, rotate(facing, final))
             out_foot_point_world[character, leg, point, 0] = final[0]
             out_foot_point_world[character, leg, point, 1] = final[1]
             out_foot_point_world[character, leg, point, 2] = final[2]
@@ -404,8 +406,8 @@ def lock_feet_crowd(
     -----
     **Source:** Kovar, Schreiner, Gleicher, "Footskate cleanup for motion capture editing", 2002: planted
     points, lowering of the root, and blending of corrections.
-    **Differs from the source:** on line, without look-ahead; the correction of a foot that is lifted fades as a
-    critically damped spring, and the heel hands over to the ball at foot flat.
+    **Differs from the source:** on line, without look-ahead; the correction of a foot that is lifted fades as
+    a critically damped spring, and the heel hands over to the ball at foot flat.
     """
     count = active.shape[0]
     for k in prange(CHUNKS):

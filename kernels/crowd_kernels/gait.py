@@ -94,8 +94,8 @@ def contact_crowd(
 
     Notes
     -----
-    **Source:** correspondence of foot events in time-warped blends (Park, Shin, Shin, 2002): events of a blend
-    are the weighted means of the examples' events.
+    **Source:** correspondence of foot events in time-warped blends (Park, Shin, Shin, 2002): events of a
+    blend are the weighted means of the examples' events.
     """
     count = active.shape[0]
     for k in prange(CHUNKS):

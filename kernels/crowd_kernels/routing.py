@@ -406,7 +406,9 @@ def follow_crowd(
                     index += 1
                 if is_near and index == corner_index[character] and index < last:
                     index += 1
-                if not is_free_line(grid, x, z, corner[character, index, 0], corner[character, index, 1], False):
+                corner_x = corner[character, index, 0]
+                corner_z = corner[character, index, 1]
+                if not is_free_line(grid, x, z, corner_x, corner_z, False):
                     out_is_lost[character] = 1
                 corner_index[character] = index
                 way_x = corner[character, index, 0] - x

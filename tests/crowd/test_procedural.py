@@ -1,4 +1,4 @@
-"""The built-in motion library walks like people: planted feet, published timing and joint ranges, no seams."""
+"""The built-in motion library walks like people: planted feet, published timing and ranges, no seams."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Whole runs: repeatable bits, stop and go on, people who walk where they should, obstacles that come and go."""
+"""Whole runs: repeatable bits, stop and go on, people who get where they should, obstacles that go."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The walkable world: doors that bodies fit through, thin walls, obstacles that come and go, ways that lead there."""
+"""The walkable world: doors that bodies fit through, thin walls, obstacles that come and go, ways."""
 
 import numpy as np
 import pytest

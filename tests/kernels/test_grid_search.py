@@ -1,5 +1,7 @@
 """Shortest ways on grids: as short as Dijkstra's, no cut corners, fields, and published optimal lengths."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -111,7 +113,7 @@ def test_traced_and_descended_ways_are_chains_of_allowed_moves(random_map):
     for way in (traced, descended):
         assert way[0] == start
         assert way[-1] == goal
-        for here, there in zip(way, way[1:], strict=False):
+        for here, there in pairwise(way):
             near = {
                 r * COLUMNS + c for _, (c, r), _ in oracle.moves(random_map, here % COLUMNS, here // COLUMNS)
             }
