@@ -10,7 +10,7 @@ import numba
 import pytest
 from llvmlite import binding
 
-from crowd_kernels import _jit, clip, pose
+from crowd_kernels import _jit, clip, lanes, pose
 
 FEATURES = binding.get_host_cpu_features()
 ROW = numba.float32[::1]
@@ -36,16 +36,16 @@ ARITHMETIC_LEAVES = {
     pose.child_row: (ROW, ROW, ROW, ROW, NUMBER, NUMBER, NUMBER, ROW, ROW),
 }
 SHUFFLE_LEAVES = {
-    pose.interleave: (ROW, ROW, ROW, ROW, INTEGER, ROW),
-    pose.deinterleave: (ROW, INTEGER, ROW, ROW, ROW, ROW),
+    lanes.interleave: (ROW, ROW, ROW, ROW, INTEGER, ROW),
+    lanes.deinterleave: (ROW, INTEGER, ROW, ROW, ROW, ROW),
 }
 CALLERS = {
     clip.blend_chunk: (
         *(ROWS, ROWS, INDICES, INTEGER, INTEGER, numba.int32[:, ::1], numba.int32[:, ::1], ROWS, ROWS, ROW),
         *(INDICES, ROWS, ROW, ROWS, ROWS, ROW),
     ),
-    pose.gather_block: (ROWS, INDICES, INTEGER, ROW, ROW),
-    pose.scatter_block: (ROW, INTEGER, INDICES, INTEGER, ROW, ROWS),
+    lanes.gather_block: (ROWS, INDICES, INTEGER, ROW, ROW),
+    lanes.scatter_block: (ROW, INTEGER, INDICES, INTEGER, ROW, ROWS),
 }
 
 
