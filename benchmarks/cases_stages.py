@@ -70,17 +70,20 @@ def set_up(size: int, rng: np.random.Generator) -> Walkers:
     for _ in simulation.run(seconds=2.0):
         pass
     active = simulation.population.active(simulation.state)
+    step = Step(
+        simulation.model,
+        simulation.state,
+        active,
+        simulation.step_index,
+        simulation.time,
+        simulation.dt,
+        simulation.seed,
+    )
+    for layer in simulation.controllers:
+        layer.evaluate(step)
     return Walkers(
         simulation,
-        Step(
-            simulation.model,
-            simulation.state,
-            active,
-            simulation.step_index,
-            simulation.time,
-            simulation.dt,
-            simulation.seed,
-        ),
+        step,
         simulation.state.pose_rotation.copy(),
         simulation.state.pose_pelvis.copy(),
     )

@@ -126,7 +126,7 @@ def separate_pair(
         return -math.inf
     dx = position_world[second, 0] - position_world[first, 0]
     dz = position_world[second, 2] - position_world[first, 2]
-    sum_of_radii = radius[first] + radius[second]
+    sum_of_radii = float(radius[first] + radius[second])
     squared = float(dx * dx + dz * dz)
     nearest = max(sum_of_radii - threshold, 0.0)
     if squared >= nearest * nearest:
