@@ -9,9 +9,23 @@ import numpy.typing as npt
 from crowd.state import ByteArray, FloatArray, IntArray
 from crowd.world import World
 from crowd.world.grid import Grid
-from crowd.world.world import RADIUS_STEP, radius_class
-from crowd_kernels.grid_search import BUCKETS, OVERFLOW, fill_field
-from crowd_kernels.routing import GridArrays, follow_crowd, route_by_field, route_by_search
+from crowd.world.world import RADIUS_STEP
+from crowd_kernels.grid_search import BUCKETS, FRESH_RECORD, LAST_GENERATION, OVERFLOW
+from crowd_kernels.routing import (
+    UNREACHABLE,
+    follow_crowd,
+    mark_crossing_ways,
+    route_by_field,
+    route_by_search,
+)
+
+BoolArray = npt.NDArray[np.bool_]
+
+FIRST_RADIUS_CLASS = 1
+THIN_BODY = 0.021
+"""Radius of a body that passes wherever no wall is crossed, m."""
+SEARCH_CHUNKS = 4
+MOST_CELLS_FOR_CHUNKS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -23,13 +37,21 @@ class RoutingSettings:
     look_ahead_period: int = 8
     """Steps after which each character looks whether it can cut a corner, >= 1; larger: cheaper, later."""
     corner_reach: float = 0.3
-    """m, > 0. A corner this near is passed."""
+    """m, > 0. A corner this near is passed as soon as the next one is in sight."""
     sharing: int = 10
     """Characters with one goal from which on a distance field is cheaper than searches, >= 1."""
+    widest_lane: float = 0.6
+    """Largest distance that people on a way of their own keep from corners, m, >= 0; 0: all hug them."""
+    widest_shared_lane: float = 3.0
+    """The same for those who share a goal, m, >= 0; larger: doors are used over more of their width."""
     most_fields: int = 32
     """Distance fields kept in memory, >= 1."""
     most_reroutes: int = 256
     """Ways found anew in one step after the world has changed, >= 1; larger: quicker, with longer steps."""
+    most_new_fields: int = 2
+    """Shared goals whose ways are found anew in one step after the world has changed, >= 1."""
+    searches_for_landmarks: int = 64
+    """Searches at once from which on it pays to look at landmarks first, >= 1."""
 
 
 class Routing:
@@ -58,21 +80,21 @@ class Routing:
         self._shared_goals = {(float(x), float(z)) for x, _, z in shared}
         corners = self.settings.most_corners
         self.goal_world: FloatArray = np.zeros((capacity, 3))
-        self.radius_class: IntArray = np.zeros(capacity, np.int32)
-        self.shares_goal: npt.NDArray[np.bool_] = np.zeros(capacity, np.bool_)
+        self.radius_class: IntArray = np.full(capacity, FIRST_RADIUS_CLASS, np.int32)
+        self.shares_goal: BoolArray = np.zeros(capacity, np.bool_)
         self.corner: FloatArray = np.zeros((capacity, corners, 2))
         self.rest: FloatArray = np.zeros((capacity, corners))
         self.corner_count: IntArray = np.zeros(capacity, np.int32)
         self.corner_index: IntArray = np.zeros(capacity, np.int32)
         self.status: ByteArray = np.zeros(capacity, np.uint8)
         """0 when there is a way, see `crowd_kernels.routing`. (character,)"""
-        self.is_stale: npt.NDArray[np.bool_] = np.zeros(capacity, np.bool_)
-        """The way was found before the world changed. (character,)"""
-        self.known_world: npt.NDArray[np.uint8] = np.zeros(16, np.uint8)
+        self.is_stale: BoolArray = np.zeros(capacity, np.bool_)
+        """The world has changed since the way was found, and the way may have to as well. (character,)"""
+        self.known_world: ByteArray = world.digest.copy()
         """Digest of the obstacles that the ways are for."""
-        self.known_world[:] = world.digest
+        self._known_version = world.version
         self._is_lost: ByteArray = np.zeros(capacity, np.uint8)
-        self._search = SearchScratch()
+        self._scratch = SearchScratch()
         self._fields: OrderedDict[tuple[bytes, int, int], IntArray] = OrderedDict()
 
     def state_fields(self) -> dict[str, npt.NDArray[np.generic]]:
@@ -91,6 +113,11 @@ class Routing:
         )
         return {name: getattr(self, name) for name in names}
 
+    def is_reachable(self, characters: IntArray) -> BoolArray:
+        """Which characters (M,) had a way to their goal when one was last looked for."""
+        reachable: BoolArray = self.status[characters] == 0
+        return reachable
+
     def set_goals(
         self, characters: IntArray, goal_world: FloatArray, radius: FloatArray, position_world: FloatArray
     ) -> None:
@@ -108,9 +135,12 @@ class Routing:
             Where everyone is, m.
         """
         self.goal_world[characters] = goal_world
-        self.radius_class[characters] = [radius_class(r) for r in radius]
+        self.radius_class[characters] = np.maximum(np.ceil(radius / RADIUS_STEP - 1e-6), FIRST_RADIUS_CLASS)
         _, group, size = np.unique(goal_world, axis=0, return_inverse=True, return_counts=True)
-        is_known = [(float(x), float(z)) in self._shared_goals for x, _, z in goal_world]
+        is_known = np.zeros(len(goal_world), np.bool_)
+        if self._shared_goals:
+            points = goal_world[:, [0, 2]].tolist()
+            is_known[:] = [(x, z) in self._shared_goals for x, z in points]
         self.shares_goal[characters] = (size[group.ravel()] >= self.settings.sharing) | is_known
         self._route(characters, position_world)
 
@@ -132,18 +162,17 @@ class Routing:
             Characters that walk.
         step_index : int
         out_way_point_world : (N, 3) float64
-            m.
+            m; their own position for characters without a way.
         out_remaining_distance : (N,) float64
             Length of the way to the goal, m; infinite without a way.
         """
-        if not np.array_equal(self.known_world, self.world.digest):
-            self.known_world[:] = self.world.digest
-            self.is_stale[active] = True
-        stale = active[self.is_stale[active]][: self.settings.most_reroutes]
-        self._route(stale, position_world)
+        self._notice_changes(position_world, active)
+        self._route(self._next_stale(active), position_world)
         for number, members in self._by_class(active):
+            grid = self.world.grid(number * RADIUS_STEP)
             follow_crowd(
-                grid_arrays(self.world.grid(number * RADIUS_STEP)),
+                grid.walls,
+                grid.radius,
                 position_world,
                 self.corner,
                 self.rest,
@@ -160,13 +189,60 @@ class Routing:
         lost = active[self._is_lost[active] == 1]
         if lost.size:
             self._route(lost, position_world)
-            has_way = lost[self.corner_count[lost] > 0]
-            out_way_point_world[has_way[:, None], [0, 2]] = self.corner[has_way, 0]
+            found = lost[self.corner_count[lost] > 0]
+            out_way_point_world[found[:, None], [0, 2]] = self.corner[found, 0]
+            to_corner = self.corner[found, 0] - position_world[found][:, [0, 2]]
+            length = np.hypot(to_corner[:, 0], to_corner[:, 1])
+            out_remaining_distance[found] = length + self.rest[found, 0]
+            stuck = lost[self.corner_count[lost] == 0]
+            out_way_point_world[stuck[:, None], [0, 2]] = position_world[stuck][:, [0, 2]]
+            out_remaining_distance[stuck] = np.inf
+
+    def _notice_changes(self, position_world: FloatArray, active: IntArray) -> None:
+        """Mark ways that a change of the world concerns: those it blocks, or all when something is gone."""
+        if not np.array_equal(self.known_world, self.world.digest):
+            changes = self.world.changes_since(self._known_version)
+            if changes is None or not changes or any(change.is_gone for change in changes):
+                self.is_stale[active] = True
+            else:
+                reach = RADIUS_STEP * int(self.radius_class[active].max(initial=FIRST_RADIUS_CLASS))
+                for change in changes:
+                    low_x, low_z = (change.low - reach).tolist()
+                    high_x, high_z = (change.high + reach).tolist()
+                    mark_crossing_ways(
+                        position_world,
+                        self.corner,
+                        self.corner_count,
+                        self.corner_index,
+                        active,
+                        low_x,
+                        low_z,
+                        high_x,
+                        high_z,
+                        self.is_stale,
+                    )
+            self.known_world[:] = self.world.digest
+        self._known_version = self.world.version
+
+    def _next_stale(self, active: IntArray) -> IntArray:
+        """Characters whose ways are to be found anew in this step: not too many, for not too many goals."""
+        stale = active[self.is_stale[active]][: self.settings.most_reroutes]
+        sharing = stale[self.shares_goal[stale]]
+        if sharing.size == 0:
+            return stale
+        _, first, group = np.unique(self.goal_world[sharing], axis=0, return_index=True, return_inverse=True)
+        last = np.sort(first)[: self.settings.most_new_fields][-1]
+        is_next = ~self.shares_goal[stale]
+        is_next[self.shares_goal[stale]] = first[group.ravel()] <= last
+        return stale[is_next]
 
     def _by_class(self, characters: IntArray) -> list[tuple[int, IntArray]]:
         """Characters by the grid they share."""
         classes = self.radius_class[characters]
-        return [(int(number), characters[classes == number]) for number in np.unique(classes)]
+        present = np.flatnonzero(np.bincount(classes)).tolist()
+        if len(present) == 1:
+            return [(present[0], characters)]
+        return [(number, characters[classes == number]) for number in present]
 
     def _route(self, characters: IntArray, position_world: FloatArray) -> None:
         """Find the ways of these characters to their goals."""
@@ -176,42 +252,30 @@ class Routing:
         self.corner_index[characters] = 0
         for number, members in self._by_class(characters):
             grid = self.world.grid(number * RADIUS_STEP)
-            goal = self.goal_world[members]
-            goal_cell = grid.nearest_cells(goal[:, [0, 2]])
+            goal_cell = grid.nearest_cells(self.goal_world[members][:, [0, 2]])
             start_cell = self._start_cells(grid, position_world[members][:, [0, 2]], goal_cell)
             is_possible = start_cell >= 0
             self.corner_count[members[~is_possible]] = 0
-            self.status[members[~is_possible]] = 1
+            self.status[members[~is_possible]] = UNREACHABLE
+            shares = is_possible & self.shares_goal[members]
             own = is_possible & ~self.shares_goal[members]
             self._search_ways(grid, members[own], start_cell[own], goal_cell[own], position_world)
-            for cell in np.unique(goal_cell[is_possible & self.shares_goal[members]]):
-                sharing = is_possible & self.shares_goal[members] & (goal_cell == cell)
-                route_by_field(
-                    grid_arrays(grid),
-                    self._field(grid, number, int(cell)),
-                    members[sharing],
-                    start_cell[sharing],
-                    position_world,
-                    self.goal_world,
-                    self._search.cells(grid),
-                    self.corner,
-                    self.rest,
-                    self.corner_count,
-                    self.status,
-                )
+            for cell in np.unique(goal_cell[shares]).tolist():
+                sharing = shares & (goal_cell == cell)
+                self._descend_field(grid, number, cell, members[sharing], start_cell[sharing], position_world)
 
     def _start_cells(self, grid: Grid, points: FloatArray, goal_cell: IntArray) -> IntArray:
-        """Cells from which to start: nearest ones in the goal's part; -1 where that is far off."""
+        """Cells from which to start, in the goal's part of the grid; -1 where there is no way."""
         cells = grid.nearest_cells(points)
         cells[goal_cell < 0] = -1
-        known = np.maximum(goal_cell, 0)
-        elsewhere = np.flatnonzero((cells >= 0) & (grid.component[cells] != grid.component[known]))
-        for index in elsewhere:
-            part = int(grid.component[goal_cell[index]])
-            near = grid.nearest_cells(points[index : index + 1], part)[0]
-            gap = np.linalg.norm(grid.point[near] - points[index])
-            # A body pressed into a corner may stand in a pocket of the grid; another room is no way out.
-            cells[index] = near if gap < 2.0 * grid.radius + grid.layout.cell_size else -1
+        elsewhere = np.flatnonzero((cells >= 0) & (grid.component[cells] != grid.component[goal_cell]))
+        if elsewhere.size:
+            # A body pressed into a corner may stand in a pocket of the grid; behind a wall is no way out.
+            reach = 2.0 * grid.radius + grid.layout.cell_size
+            near = grid.nearest_cells(points[elsewhere], grid.component[goal_cell[elsewhere]], reach)
+            for index, cell in zip(elsewhere.tolist(), near.tolist(), strict=True):
+                is_beside = cell >= 0 and grid.is_free_line(points[index], grid.point[cell], THIN_BODY)
+                cells[index] = cell if is_beside else -1
         return cells
 
     def _search_ways(
@@ -223,104 +287,106 @@ class Routing:
         position_world: FloatArray,
     ) -> None:
         """Find own ways by A*."""
-        if characters.size == 0:
-            return
-        cost, arrival, stamp, head, following, entry = self._search.arrays(grid)
-        route_by_search(
-            grid_arrays(grid),
+        waiting = np.arange(characters.size)
+        landmark_cost = np.zeros((0, grid.layout.cell_count), np.int32)
+        if characters.size >= self.settings.searches_for_landmarks:
+            landmark_cost = grid.landmark_cost
+        while waiting.size:
+            members = characters[waiting]
+            route_by_search(
+                grid.arrays,
+                grid.walls,
+                landmark_cost,
+                members,
+                start_cell[waiting],
+                goal_cell[waiting],
+                position_world,
+                self.goal_world,
+                self.settings.widest_lane,
+                *self._scratch.arrays(grid, waiting.size),
+                self._scratch.cells(grid),
+                self.corner,
+                self.rest,
+                self.corner_count,
+                self.status,
+            )
+            waiting = waiting[self.status[members] == OVERFLOW]
+            if waiting.size:
+                self._scratch.lengthen_queue()
+
+    def _descend_field(
+        self,
+        grid: Grid,
+        number: int,
+        goal_cell: int,
+        characters: IntArray,
+        start_cell: IntArray,
+        position_world: FloatArray,
+    ) -> None:
+        """Find the ways of characters with one goal down its distance field."""
+        key = (self.world.digest.tobytes(), number, goal_cell)
+        if key not in self._fields:
+            self._fields[key] = grid.field(np.array([goal_cell], np.int32))
+            while len(self._fields) > self.settings.most_fields:
+                self._fields.popitem(last=False)
+        self._fields.move_to_end(key)
+        route_by_field(
+            grid.arrays,
+            grid.walls,
+            self._fields[key],
             characters,
             start_cell,
-            goal_cell,
             position_world,
             self.goal_world,
-            self._search.next_generation(characters.size),
-            cost,
-            arrival,
-            stamp,
-            head,
-            following,
-            entry,
-            self._search.cells(grid),
+            self.settings.widest_shared_lane,
+            self._scratch.cells(grid),
             self.corner,
             self.rest,
             self.corner_count,
             self.status,
         )
 
-    def _field(self, grid: Grid, number: int, goal_cell: int) -> IntArray:
-        """The distance field of a goal."""
-        key = (self.known_world.tobytes(), number, goal_cell)
-        if key not in self._fields:
-            cost = np.zeros(grid.layout.cell_count, np.int32)
-            entries = 4 * grid.layout.cell_count + 8
-            goals = np.array([goal_cell], np.int32)
-            while True:
-                queue = (
-                    np.zeros(BUCKETS, np.int32),
-                    np.zeros(entries, np.int32),
-                    np.zeros(entries, np.int32),
-                )
-                if fill_field(grid.mask, grid.layout.columns, goals, *queue, cost) != OVERFLOW:
-                    break
-                entries *= 2
-            self._fields[key] = cost
-            while len(self._fields) > self.settings.most_fields:
-                self._fields.popitem(last=False)
-        self._fields.move_to_end(key)
-        return self._fields[key]
-
 
 class SearchScratch:
     """Work arrays of A*, made when first needed and kept for grids of the same size."""
 
     def __init__(self) -> None:
-        self._size = 0
         self._generation = 0
-        self._arrays: tuple[npt.NDArray[np.generic], ...] = ()
-        self._cells: IntArray = np.zeros(0, np.int32)
+        self._record: npt.NDArray[np.int64] = np.zeros((0, 0), np.int64)
+        self._head: IntArray = np.zeros((0, BUCKETS), np.int32)
+        self._queue: npt.NDArray[np.int64] = np.zeros((0, 0), np.int64)
+        self._cells: IntArray = np.zeros((0, 0), np.int32)
 
-    def arrays(self, grid: Grid) -> tuple[npt.NDArray[np.generic], ...]:
-        """Cost, arrival, stamp, head, following, entry."""
+    def arrays(
+        self, grid: Grid, queries: int
+    ) -> tuple[int, npt.NDArray[np.int64], IntArray, npt.NDArray[np.int64]]:
+        """First of `queries` unused generations, record, head and queue."""
         size = grid.layout.cell_count
-        if size != self._size:
-            self._size, self._generation = size, 0
-            entries = 8 * size + 8
-            self._arrays = (
-                np.zeros(size, np.int32),
-                np.zeros(size, np.uint8),
-                np.zeros(size, np.int32),
-                np.zeros(BUCKETS, np.int32),
-                np.zeros(entries, np.int32),
-                np.zeros(entries, np.int32),
-            )
-        return self._arrays
-
-    def next_generation(self, queries: int) -> int:
-        """First of `queries` unused generation numbers."""
-        if self._generation > 2**30:
+        if self._record.shape[1] != size:
+            chunks = chunk_count(size)
+            self._record = np.full((chunks, size), FRESH_RECORD)
+            self._head = np.zeros((chunks, BUCKETS), np.int32)
+            self._queue = np.zeros((chunks, size // 2 + 64), np.int64)
             self._generation = 0
-            self._arrays[2][:] = 0
-        first = self._generation + 2
-        self._generation += 2 * queries
-        return first
+        if self._generation + queries > LAST_GENERATION:
+            self._record[:] = FRESH_RECORD
+            self._generation = 0
+        first = self._generation + 1
+        self._generation += queries
+        return first, self._record, self._head, self._queue
+
+    def lengthen_queue(self) -> None:
+        """Make twice as much room for open cells."""
+        self._queue = np.zeros((self._queue.shape[0], 2 * self._queue.shape[1]), np.int64)
 
     def cells(self, grid: Grid) -> IntArray:
-        """Room for the cells of one way."""
-        if self._cells.size < grid.layout.cell_count:
-            self._cells = np.zeros(grid.layout.cell_count, np.int32)
+        """Room for the cells of a way in each chunk."""
+        size = grid.layout.cell_count
+        if self._cells.shape[1] != size:
+            self._cells = np.zeros((chunk_count(size), size), np.int32)
         return self._cells
 
 
-def grid_arrays(grid: Grid) -> GridArrays:
-    """A grid as the kernels read it."""
-    layout = grid.layout
-    return GridArrays(
-        grid.mask,
-        grid.is_open,
-        grid.point,
-        float(layout.low_x),
-        float(layout.low_z),
-        float(layout.cell_size),
-        layout.columns,
-        layout.rows,
-    )
+def chunk_count(cell_count: int) -> int:
+    """Sets of scratch arrays: what several threads can use, but one for huge grids, to save memory."""
+    return SEARCH_CHUNKS if cell_count <= MOST_CELLS_FOR_CHUNKS else 1

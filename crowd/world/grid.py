@@ -1,24 +1,36 @@
 """The walkable grid of a world for one body radius."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-import shapely
-from scipy import ndimage
 
-from crowd_kernels.grid_search import COLUMN_STEP, ROW_STEP, label_components, mask_moves
+from crowd_kernels.distance_field import fill_field, label_components
+from crowd_kernels.free_line import is_free_line
+from crowd_kernels.grid_search import BUCKETS, OVERFLOW, UNSEEN
+from crowd_kernels.walkable import (
+    GroundGrid,
+    cover_samples,
+    find_places,
+    link_places,
+    mask_links,
+    nearest_cells,
+)
+from crowd_kernels.wall_cells import list_edges
+from crowd_kernels.walls import WallTable
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 ByteArray = npt.NDArray[np.uint8]
+WordArray = npt.NDArray[np.uint32]
 Bounds = tuple[float, float, float, float]
+Window = tuple[int, int, int, int]
+"""First column, last column + 1, first row, last row + 1."""
 
-SUBCELLS = 7
-"""A body's place is looked for on so many lines across a cell."""
-MARGIN = 0.01
-"""A gap may be narrower than the body by this much, m: rounding of what a user wrote."""
 MOST_CELLS = 4_000_000
+CELLS_PER_LIST = 4
+"""Walls are listed for squares of so many cells by so many."""
+LANDMARKS = 4
 
 
 @dataclass(frozen=True)
@@ -29,6 +41,8 @@ class Layout:
     ----------
     low_x, low_z : float
         Lowest corner, m.
+    high_x, high_z : float
+        Highest corner of the ground, m; the last cells may reach beyond.
     cell_size : float
         m.
     columns, rows : int
@@ -37,6 +51,8 @@ class Layout:
 
     low_x: float
     low_z: float
+    high_x: float
+    high_z: float
     cell_size: float
     columns: int
     rows: int
@@ -47,19 +63,18 @@ class Layout:
         width, depth = bounds[1] - bounds[0], bounds[3] - bounds[2]
         size = max(cell_size, float(np.sqrt(width * depth / MOST_CELLS)))
         columns, rows = (max(int(np.ceil(extent / size - 1e-9)), 1) for extent in (width, depth))
-        return cls(bounds[0], bounds[2], size, columns, rows)
+        low_x, high_x, low_z, high_z = (float(side) for side in bounds)
+        return cls(low_x, low_z, high_x, high_z, size, columns, rows)
 
     @property
     def cell_count(self) -> int:
         """Number of cells."""
         return self.columns * self.rows
 
-    def centers(self) -> FloatArray:
-        """Centres of all cells, (cells, 2), m."""
-        x = self.low_x + (np.arange(self.columns) + 0.5) * self.cell_size
-        z = self.low_z + (np.arange(self.rows) + 0.5) * self.cell_size
-        grid_x, grid_z = np.meshgrid(x, z)
-        return np.column_stack([grid_x.ravel(), grid_z.ravel()])
+    @property
+    def everything(self) -> Window:
+        """The window of all cells."""
+        return 0, self.columns, 0, self.rows
 
     def cells_at(self, points: FloatArray) -> IntArray:
         """Cells of ground points (P, 2); points outside belong to the nearest border cell."""
@@ -67,8 +82,45 @@ class Layout:
         row = np.clip((points[:, 1] - self.low_z) / self.cell_size, 0, self.rows - 1).astype(np.int32)
         return row * np.int32(self.columns) + column
 
+    def window(self, low: FloatArray, high: FloatArray) -> Window:
+        """Cells that touch the rectangle from `low` to `high` (x, z), m; may be empty."""
+        size = np.array([self.columns, self.rows])
+        origin = np.array([self.low_x, self.low_z])
+        first = np.clip(np.floor((low - origin) / self.cell_size), 0, size).astype(int)
+        last = np.clip(np.floor((high - origin) / self.cell_size) + 1, 0, size).astype(int)
+        return int(first[0]), int(last[0]), int(first[1]), int(last[1])
 
-@dataclass(frozen=True)
+
+def cover_ground(
+    layout: Layout, outlines: list[FloatArray], cover: WordArray, window: Window | None = None
+) -> None:
+    """Mark which samples of the cells of a window lie inside solids.
+
+    Parameters
+    ----------
+    layout : Layout
+    outlines : list of (K, 2)
+        Solids, m.
+    cover : (cells,) uint32
+        Changed in place, see `crowd_kernels.walkable.cover_samples`.
+    window : Window, optional
+        All cells when left out.
+    """
+    area = window or layout.everything
+    whole = cover.reshape(layout.rows, layout.columns)
+    whole[area[2] : area[3], area[0] : area[1]] = 0
+    for outline in outlines:
+        own = layout.window(outline.min(axis=0), outline.max(axis=0))
+        first_column, last_column = max(own[0], area[0]), min(own[1], area[1])
+        first_row, last_row = max(own[2], area[2]), min(own[3], area[3])
+        if first_column >= last_column or first_row >= last_row:
+            continue
+        inside = np.zeros((last_row - first_row, last_column - first_column), np.uint32)
+        cover_samples(outline, layout.low_x, layout.low_z, layout.cell_size, first_column, first_row, inside)
+        whole[first_row:last_row, first_column:last_column] |= inside
+
+
+@dataclass
 class Grid:
     """Where a body of one radius can be, and how it can move.
 
@@ -77,128 +129,155 @@ class Grid:
     layout : Layout
     radius : float
         m.
-    mask : (cells,) uint8
-        Moves of each cell, see `crowd_kernels.grid_search`.
-    is_open : (cells,) uint8
-        The body fits with its centre at the centre of the cell: straight lines may cross it.
-    point : (cells, 2) float64
-        Place in the cell with most room, m.
-    component : (cells,) int32
-        Connected part that the cell belongs to; -1 where the body does not fit.
+    is_walkable : (cells,) uint8
+        1 where the body fits.
+    link : (cells,) uint8
+        Between which cells it can go straight, see `crowd_kernels.walkable.link_places`.
+    arrays : GroundGrid
+        What kernels read: moves, places and components of the cells.
+    walls : WallTable
+        Walls near each place, up to the radius and a cell more.
     """
 
     layout: Layout
     radius: float
-    mask: ByteArray
-    is_open: ByteArray
-    point: FloatArray
-    component: IntArray
+    is_walkable: ByteArray
+    link: ByteArray
+    arrays: GroundGrid
+    walls: WallTable
+    _landmarks: IntArray | None = field(default=None, repr=False)
 
     @classmethod
-    def build(cls, layout: Layout, tree: shapely.STRtree, radius: float) -> "Grid":
+    def build(cls, layout: Layout, edge: FloatArray, cover: WordArray, radius: float) -> "Grid":
         """Find where a body fits.
 
-        A cell counts as walkable when the body fits somewhere in it, so that a gap is passed wherever the
-        grid lies. Between two such cells the straight way must be free as well, which keeps ways from passing
-        through thin walls and gaps that are too narrow.
+        Parameters
+        ----------
+        layout : Layout
+        edge : (W, EDGE_COLUMNS) float64
+            Edges of all walls, see `crowd_kernels.walls.WallTable`.
+        cover : (cells,) uint32
+            See `cover_ground`.
+        radius : float
+            m.
         """
-        centers = layout.centers()
-        close = cells_near(layout, tree, radius + layout.cell_size)
-        room, nearby = np.full(layout.cell_count, np.inf), np.zeros(layout.cell_count, np.bool_)
-        room[close], nearby[close] = clearance(tree, centers[close], reach=radius + layout.cell_size)
-        is_open = room >= radius
-        point = centers.copy()
-        best_room = room.copy()
-        doubtful = np.flatnonzero(~is_open & (room + 0.71 * layout.cell_size >= radius))
-        shift = (np.arange(SUBCELLS) + 0.5) / SUBCELLS - 0.5
-        for dx in shift * layout.cell_size:
-            for dz in shift * layout.cell_size:
-                candidates = centers[doubtful] + (dx, dz)
-                here, _ = clearance(tree, candidates, reach=radius + layout.cell_size)
-                better = here > best_room[doubtful]
-                chosen = doubtful[better]
-                point[chosen], best_room[chosen] = candidates[better], here[better]
-        is_walkable = (best_room >= radius - MARGIN).astype(np.uint8)
-        mask = np.zeros(layout.cell_count, np.uint8)
-        mask_moves(is_walkable, layout.columns, layout.rows, mask)
-        close_narrow_moves(layout, tree, radius, is_walkable, nearby, point, mask)
-        component = np.zeros(layout.cell_count, np.int32)
-        label_components(mask, layout.columns, component)
-        component[is_walkable == 0] = -1
-        return cls(layout, radius, mask, is_open.astype(np.uint8), point, component)
+        cells = layout.cell_count
+        arrays = GroundGrid(
+            np.zeros(cells, np.uint8),
+            np.zeros((cells, 2)),
+            np.zeros(cells, np.int32),
+            radius,
+            layout.low_x,
+            layout.low_z,
+            layout.high_x,
+            layout.high_z,
+            layout.cell_size,
+            layout.columns,
+            layout.rows,
+        )
+        walls = wall_table(layout, edge, radius)
+        grid = cls(layout, radius, np.zeros(cells, np.uint8), np.zeros(cells, np.uint8), arrays, walls)
+        grid._measure(cover, layout.everything)
+        return grid
 
-    def nearest_cells(self, points: FloatArray, component: int | None = None) -> IntArray:
+    @property
+    def mask(self) -> ByteArray:
+        """Moves of each cell, see `crowd_kernels.grid_search`. (cells,)"""
+        mask: ByteArray = self.arrays.mask
+        return mask
+
+    @property
+    def point(self) -> FloatArray:
+        """Place in each cell where the body fits best, m. (cells, 2)"""
+        point: FloatArray = self.arrays.point
+        return point
+
+    @property
+    def component(self) -> IntArray:
+        """Connected part that each cell belongs to; -1 where the body does not fit. (cells,)"""
+        component: IntArray = self.arrays.component
+        return component
+
+    @property
+    def landmark_cost(self) -> IntArray:
+        """Distance fields of cells far from each other, which shorten many searches. (L, cells)"""
+        if self._landmarks is None:
+            self._landmarks = self._find_landmarks()
+        return self._landmarks
+
+    def update(self, edge: FloatArray, cover: WordArray, low: FloatArray, high: FloatArray) -> None:
+        """Find anew where the body fits, after walls have changed between `low` and `high` (x, z), m."""
+        reach = self.radius + self.layout.cell_size
+        self.walls = wall_table(self.layout, edge, self.radius)
+        self._measure(cover, self.layout.window(low - reach, high + reach))
+
+    def nearest_cells(
+        self, points: FloatArray, component: IntArray | None = None, reach: float = np.inf
+    ) -> IntArray:
         """Nearest cells in which the body fits, for ground points (P, 2); -1 when there are none."""
-        usable = self.component >= 0 if component is None else self.component == component
-        cells = self.layout.cells_at(points)
-        missing = ~usable[cells]
-        if missing.any():
-            if not usable.any():
-                return np.full(len(points), -1, np.int32)
-            shape = (self.layout.rows, self.layout.columns)
-            nearest = ndimage.distance_transform_edt(
-                ~usable.reshape(shape), return_distances=False, return_indices=True
-            )
-            flat = (nearest[0] * self.layout.columns + nearest[1]).ravel().astype(np.int32)
-            cells[missing] = flat[cells[missing]]
+        cells = np.zeros(len(points), np.int32)
+        part = np.full(len(points), -1, np.int32) if component is None else component
+        nearest_cells(self.arrays, np.ascontiguousarray(points), part, reach, cells)
         return cells
 
+    def is_free_line(self, start: FloatArray, end: FloatArray, radius: float | None = None) -> bool:
+        """Tell whether a body, of the grid's radius when left out, can go straight between points (x, z)."""
+        body = self.radius if radius is None else radius
+        return bool(is_free_line(self.walls, body, *start.tolist(), *end.tolist()))
 
-def clearance(
-    tree: shapely.STRtree, points: FloatArray, reach: float
-) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Distance of points (P, 2) to the nearest obstacle, m; infinite beyond `reach`, and who is within it."""
-    distance = np.full(len(points), np.inf)
-    if len(tree.geometries) and len(points):
-        (asked, _), gap = tree.query_nearest(
-            shapely.points(points), max_distance=reach, return_distance=True, all_matches=False
-        )
-        distance[asked] = gap
-    return distance, np.isfinite(distance)
+    def field(self, goal_cells: IntArray) -> IntArray:
+        """Cost from each cell to the nearest goal cell, (cells,). See `crowd_kernels.distance_field`."""
+        cells = self.layout.cell_count
+        cost = np.zeros(cells, np.int32)
+        head = np.zeros(BUCKETS, np.int32)
+        entries = cells + goal_cells.size
+        while (
+            fill_field(self.mask, self.layout.columns, goal_cells, head, np.zeros(entries, np.int64), cost)
+            == OVERFLOW
+        ):
+            entries *= 2
+        return cost
 
+    def _measure(self, cover: WordArray, window: Window) -> None:
+        """Compute all arrays in a window and what depends on them."""
+        first_column, last_column, first_row, last_row = window
+        self._landmarks = None
+        find_places(self.arrays, self.walls, cover, *window, self.is_walkable, self.point)
+        # A link belongs to its lower cell, a move to both.
+        low_column, low_row = max(first_column - 1, 0), max(first_row - 1, 0)
+        high_column = min(last_column + 1, self.layout.columns)
+        high_row = min(last_row + 1, self.layout.rows)
+        around = (low_column, high_column, low_row, high_row)
+        link_places(self.arrays, self.walls, self.is_walkable, *around, self.link)
+        mask_links(self.link, self.layout.columns, self.layout.rows, *around, self.mask)
+        label_components(self.mask, self.layout.columns, self.component)
+        self.component[self.is_walkable == 0] = -1
 
-def cells_near(layout: Layout, tree: shapely.STRtree, reach: float) -> npt.NDArray[np.intp]:
-    """Cells whose centre may be within `reach` of an obstacle: those near the boxes around obstacles."""
-    is_near = np.zeros((layout.rows, layout.columns), np.bool_)
-    for low_x, low_z, high_x, high_z in shapely.bounds(tree.geometries).reshape(-1, 4):
-        first = np.floor(
-            np.array([low_x - layout.low_x, low_z - layout.low_z]) / layout.cell_size
-            - reach / layout.cell_size
-        )
-        last = np.ceil(
-            np.array([high_x - layout.low_x, high_z - layout.low_z]) / layout.cell_size
-            + reach / layout.cell_size
-        )
-        column, row = np.maximum(first, 0).astype(int)
-        end_column, end_row = np.maximum(last, 0).astype(int)
-        is_near[row : end_row + 1, column : end_column + 1] = True
-    return np.flatnonzero(is_near.ravel())
-
-
-def close_narrow_moves(
-    layout: Layout,
-    tree: shapely.STRtree,
-    radius: float,
-    is_walkable: ByteArray,
-    nearby: npt.NDArray[np.bool_],
-    point: FloatArray,
-    mask: ByteArray,
-) -> None:
-    """Take out moves, in place, whose straight way has less room than the body needs."""
-    border = np.flatnonzero(nearby & (is_walkable == 1))
-    for move, (column_step, row_step) in enumerate(zip(COLUMN_STEP, ROW_STEP, strict=True)):
-        starts = border[(mask[border] >> move) & 1 == 1]
-        if len(starts) == 0 or len(tree.geometries) == 0:
-            continue
-        ends = starts + column_step + row_step * layout.columns
-        lines = shapely.linestrings(np.stack([point[starts], point[ends]], axis=1))
-        near, _ = tree.query(lines, predicate="dwithin", distance=radius - 2 * MARGIN)
-        blocked = np.unique(near)
-        mask[starts[blocked]] &= np.uint8(255 - (1 << move))
-        mask[ends[blocked]] &= np.uint8(255 - (1 << opposite_move(move)))
+    def _find_landmarks(self) -> IntArray:
+        """Compute the fields of cells that are far from each other, in the largest part of the grid."""
+        known = self.component[self.component >= 0]
+        if known.size == 0:
+            return np.zeros((0, self.layout.cell_count), np.int32)
+        first = np.argmax(np.bincount(known)).astype(np.int32)
+        cost = np.zeros((LANDMARKS, self.layout.cell_count), np.int32)
+        nearest = self.field(np.array([first], np.int32))
+        for landmark in range(LANDMARKS):
+            far = np.argmax(np.where(nearest < UNSEEN, nearest, -1)).astype(np.int32)
+            cost[landmark] = self.field(np.array([far], np.int32))
+            nearest = cost[0].copy() if landmark == 0 else np.minimum(nearest, cost[landmark])
+        return cost
 
 
-def opposite_move(move: int) -> int:
-    """Number of the move back."""
-    steps = list(zip(COLUMN_STEP, ROW_STEP, strict=True))
-    return steps.index((-COLUMN_STEP[move], -ROW_STEP[move]))
+def wall_table(layout: Layout, edge: FloatArray, radius: float) -> WallTable:
+    """List the walls near each square of cells, up to the radius and a cell more."""
+    reach = radius + layout.cell_size
+    size = layout.cell_size * CELLS_PER_LIST
+    columns, rows = -(-layout.columns // CELLS_PER_LIST), -(-layout.rows // CELLS_PER_LIST)
+    place = (layout.low_x, layout.low_z, size, columns, rows, reach)
+    cell_start = np.zeros(columns * rows + 1, np.int32)
+    edge = np.ascontiguousarray(edge)
+    cell_edge = np.zeros(list_edges(edge, *place, cell_start, np.zeros(0, np.int32)), np.int32)
+    list_edges(edge, *place, cell_start, cell_edge)
+    for array in (edge, cell_start, cell_edge):
+        array.flags.writeable = False
+    return WallTable(edge, cell_start, cell_edge, *place)

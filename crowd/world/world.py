@@ -3,12 +3,13 @@
 import hashlib
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from crowd.world.grid import Bounds, Grid, Layout
+from crowd.world.grid import Bounds, Grid, Layout, cover_ground
 from crowd.world.obstacles import Shape, Wall
 from crowd.world.walls import Walls
 
@@ -18,6 +19,28 @@ BoolArray = npt.NDArray[np.bool_]
 CELL_SIZE = 0.25
 RADIUS_STEP = 0.05
 """Bodies share a grid with others whose radius rounds up to the same multiple of this, m."""
+MOST_CHANGES = 256
+"""Changes that the world remembers."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """An obstacle that has come or gone.
+
+    Attributes
+    ----------
+    version : int
+        Version of the world since then.
+    low, high : (2,) float64
+        Corners of the rectangle around it (x, z), m.
+    is_gone : bool
+        It was taken away.
+    """
+
+    version: int
+    low: FloatArray
+    high: FloatArray
+    is_gone: bool
 
 
 class World:
@@ -29,17 +52,24 @@ class World:
         Lowest and highest x, lowest and highest z, m. Nobody walks outside.
     obstacles : sequence of Shape
     cell_size : float
-        Cells of the walkable grids, m.
+        Cells of the walkable grids, m; larger in huge worlds.
     """
 
     def __init__(self, bounds: Bounds, obstacles: Sequence[Shape] = (), cell_size: float = CELL_SIZE) -> None:
         if not (math.isfinite(sum(bounds)) and bounds[0] < bounds[1] and bounds[2] < bounds[3]):
             raise ValueError(f"world: bounds are {bounds}; allowed x low < x high, z low < z high, finite")
+        if not (math.isfinite(cell_size) and cell_size > 0.0):
+            raise ValueError(f"world: cell size is {cell_size}; allowed a positive number of metres")
         self.bounds = bounds
         self.layout = Layout.over(bounds, cell_size)
+        self.version = 0
+        """Grows with every obstacle that comes or goes."""
+        self._changes: list[Change] = []
         self._obstacles: dict[int, Shape] = dict(enumerate(obstacles))
         self._next_number = len(self._obstacles)
-        self._refresh()
+        self._grids: dict[int, Grid] = {}
+        self._cover = np.zeros(0, np.uint32)
+        self._list_obstacles()
 
     @property
     def obstacles(self) -> tuple[Shape, ...]:
@@ -51,7 +81,7 @@ class World:
         number = self._next_number
         self._next_number += 1
         self._obstacles[number] = shape
-        self._refresh()
+        self._change(shape, is_gone=False)
         return number
 
     def remove_obstacle(self, number: int) -> None:
@@ -62,14 +92,23 @@ class World:
         KeyError
             There is none of this number.
         """
-        del self._obstacles[number]
-        self._refresh()
+        self._change(self._obstacles.pop(number), is_gone=True)
+
+    def changes_since(self, version: int) -> list[Change] | None:
+        """Obstacles that have come and gone since a version; None when that is too long ago."""
+        if self.version - version > len(self._changes):
+            return None
+        return self._changes[len(self._changes) - (self.version - version) :]
 
     def grid(self, radius: float) -> Grid:
         """The walkable grid for a body radius, m."""
         step = radius_class(radius)
         if step not in self._grids:
-            self._grids[step] = Grid.build(self.layout, self.tree, step * RADIUS_STEP)
+            if self._cover.size == 0:
+                self._cover = np.zeros(self.layout.cell_count, np.uint32)
+                cover_ground(self.layout, self._solids(), self._cover)
+            edge = self.walls.table.edge
+            self._grids[step] = Grid.build(self.layout, edge, self._cover, step * RADIUS_STEP)
         return self._grids[step]
 
     def clearance_at(self, points_world: FloatArray) -> FloatArray:
@@ -91,17 +130,16 @@ class World:
 
     def is_walkable(self, points_world: FloatArray, radius: float) -> BoolArray:
         """At which points (P, 3) a body fits."""
-        has_room = self.clearance_at(points_world) >= radius - 1e-6
-        return np.logical_and(self.is_inside_bounds(points_world), has_room)
+        return self.is_inside_bounds(points_world) & (self.clearance_at(points_world) >= radius - 1e-6)
 
     def nearest_walkable(self, points_world: FloatArray, radius: float) -> FloatArray:
-        """The points (P, 3) themselves where a body fits, else the nearest places of the grid."""
+        """The points (P, 3) where a body fits, else the nearest places of the grid; NaN if none."""
         result = np.array(points_world, dtype=np.float64)
         wrong = np.flatnonzero(~self.is_walkable(result, radius))
         if len(wrong):
             grid = self.grid(radius)
             cells = grid.nearest_cells(result[wrong][:, [0, 2]])
-            result[wrong[:, None], [0, 2]] = grid.point[cells]
+            result[wrong[:, None], [0, 2]] = np.where(cells[:, None] >= 0, grid.point[cells], np.nan)
         return result
 
     def is_reachable(self, start_world: FloatArray, goal_world: FloatArray, radius: float) -> BoolArray:
@@ -109,19 +147,36 @@ class World:
         grid = self.grid(radius)
         starts = grid.nearest_cells(start_world[:, [0, 2]])
         goals = grid.nearest_cells(goal_world[:, [0, 2]])
-        is_one_part = grid.component[starts] == grid.component[goals]
-        return np.asarray((starts >= 0) & (goals >= 0) & is_one_part, np.bool_)
+        is_known = (starts >= 0) & (goals >= 0)
+        is_reachable: BoolArray = is_known & (grid.component[starts] == grid.component[goals])
+        return is_reachable
 
-    def _refresh(self) -> None:
-        """Rebuild what depends on obstacles; grids are made again when they are asked for."""
+    def _change(self, shape: Shape, *, is_gone: bool) -> None:
+        """Update everything that depends on an obstacle that has come or gone."""
+        self._list_obstacles()
+        self.version += 1
+        outline = shape.outline()
+        change = Change(self.version, outline.min(axis=0), outline.max(axis=0), is_gone)
+        self._changes = [*self._changes, change][-MOST_CHANGES:]
+        if self._cover.size:
+            window = self.layout.window(change.low, change.high)
+            cover_ground(self.layout, self._solids(), self._cover, window)
+        for grid in self._grids.values():
+            grid.update(self.walls.table.edge, self._cover, change.low, change.high)
+
+    def _solids(self) -> list[FloatArray]:
+        """Outlines of obstacles with an inside."""
+        return [shape.outline() for shape in self._obstacles.values() if not isinstance(shape, Wall)]
+
+    def _list_obstacles(self) -> None:
+        """Rebuild the tree and the walls."""
         shapes = self._obstacles.values()
-        outlines = b"".join(shape.outline().tobytes() + b";" for shape in self._obstacles.values())
+        outlines = b"".join(shape.outline().tobytes() + b";" for shape in shapes)
         self.digest = np.frombuffer(hashlib.blake2s(outlines, digest_size=16).digest(), np.uint8)
         """Sixteen bytes that differ between different obstacles."""
         self.tree = shapely.STRtree([shape.geometry() for shape in shapes])
-        self._grids: dict[int, Grid] = {}
         self.walls = Walls.build(
-            polygons=[shape.outline() for shape in shapes if not isinstance(shape, Wall)],
+            polygons=self._solids(),
             segments=[shape.outline() for shape in shapes if isinstance(shape, Wall)],
         )
 

@@ -1,7 +1,13 @@
-"""Shortest ways on a grid: A* for one goal, distance fields for a goal that many share.
+"""Shortest ways on a grid for goals of one's own: A*.
 
 Cells are numbered ``row * columns + column``. A mask holds one bit for each of the eight moves that a cell
-allows, with the corner rule and thin walls baked in, so that the searches need no tests of borders.
+allows, with borders and the corner rule baked in, so that searches test neither. Moves go both ways, and a
+diagonal move needs the four straight moves around its block of four cells; `crowd_kernels.walkable` makes
+such masks, also for walls thinner than a cell.
+
+Moves that cannot be needed are left out: those to cells that the cell before reaches as cheaply without the
+one between. No shortest way is lost by that: a move that is left out although it ends a shortest way has a
+partner, diagonal first and straight second, whose straight move is never left out.
 """
 
 import math
@@ -18,9 +24,62 @@ FOUND = 0
 UNREACHABLE = 1
 OVERFLOW = 2
 UNSEEN = np.int32(2**30)
+"""Cost of cells that cannot be reached."""
 COLUMN_STEP = (1, -1, 0, 0, 1, 1, -1, -1)
 ROW_STEP = (0, 0, 1, -1, 1, -1, 1, -1)
 MOVE_COST = (STRAIGHT, STRAIGHT, STRAIGHT, STRAIGHT, DIAGONAL, DIAGONAL, DIAGONAL, DIAGONAL)
+ANY_MOVE = 8
+"""Arrival at cells where ways begin."""
+LAST_GENERATION = 2**30
+FRESH_RECORD = np.int64(2**62)
+"""What records hold before the first search."""
+
+
+def useful_moves(arrival: int, moves: int) -> int:
+    """Find the moves that may continue a shortest way.
+
+    Parameters
+    ----------
+    arrival : int
+        Move by which the way came to the cell; `ANY_MOVE` where it begins.
+    moves : int
+        Bits of the moves that the cell allows.
+
+    Returns
+    -------
+    int
+        Bits of the moves to try.
+    """
+    if arrival == ANY_MOVE:
+        return moves
+    steps = list(zip(COLUMN_STEP, ROW_STEP, strict=True))
+    along = steps[arrival]
+    useful = 0
+    for move, (column, row) in enumerate(steps):
+        if not moves >> move & 1:
+            continue
+        if arrival >= 4:
+            is_useful = (column, row) in ((along[0], 0), (0, along[1]), along)
+        elif (column, row) == along:
+            is_useful = True
+        elif column * along[0] + row * along[1] < 0:
+            is_useful = False
+        else:
+            # To the side, or ahead and to the side: the cell before could do that with its own diagonal move,
+            # which exists when this cell could go back to the side.
+            side = (column, 0) if along[0] == 0 else (0, row)
+            back = steps.index((side[0] - along[0], side[1] - along[1]))
+            is_useful = not moves >> back & 1
+        if is_useful:
+            useful |= 1 << move
+    return useful
+
+
+USEFUL_MOVES = np.array([[useful_moves(a, m) for m in range(256)] for a in range(9)], np.uint8)
+MOVE_COUNT = np.array([bin(m).count("1") for m in range(256)], np.int8)
+MOVE_LIST = np.array(
+    [[b for b in range(8) if m >> b & 1] + [0] * (8 - bin(m).count("1")) for m in range(256)], np.int8
+)
 
 
 @kernel
@@ -44,39 +103,30 @@ def octile(columns: int, a: int, b: int) -> int:
     return STRAIGHT * max(across, along) + (DIAGONAL - STRAIGHT) * min(across, along)
 
 
-@parallel_kernel
-def mask_moves(is_walkable: Any, columns: int, rows: int, out_mask: Any) -> None:
-    """Find the moves that each cell allows: to walkable cells, diagonally only past two walkable ones.
+@kernel
+def best_landmark(landmark_cost: Any, start: int, goal: int) -> int:
+    """Find the landmark whose distance field promises the longest way between two cells.
 
     Parameters
     ----------
-    is_walkable : (rows * columns,) uint8
-        1 where one can be.
-    columns, rows : int
-        Size of the grid.
-    out_mask : (rows * columns,) uint8
-        Bit d for the move (COLUMN_STEP[d], ROW_STEP[d]).
+    landmark_cost : (L, cells) int32
+        Costs of `crowd_kernels.distance_field.fill_field`, one row for each landmark.
+    start, goal : int
+        Cells.
 
-    Notes
-    -----
-    **Source:** rules of the Moving AI benchmarks (Sturtevant, 2012): eight moves, no cutting of corners.
+    Returns
+    -------
+    int
+        Row; -1 without landmarks.
     """
-    for row in prange(rows):
-        for column in range(columns):
-            mask = 0
-            cell = row * columns + column
-            if is_walkable[cell]:
-                for move in range(8):
-                    i = column + COLUMN_STEP[move]
-                    j = row + ROW_STEP[move]
-                    if i < 0 or j < 0 or i >= columns or j >= rows:
-                        continue
-                    free = is_walkable[j * columns + i]
-                    if move >= 4:
-                        free = free and is_walkable[row * columns + i] and is_walkable[j * columns + column]
-                    if free:
-                        mask |= 1 << move
-            out_mask[cell] = mask
+    best = -1
+    most = -1
+    for landmark in range(landmark_cost.shape[0]):
+        difference = abs(landmark_cost[landmark, start] - landmark_cost[landmark, goal])
+        if difference > most:
+            best = landmark
+            most = difference
+    return best
 
 
 @kernel
@@ -86,12 +136,10 @@ def search_cells(
     start: int,
     goal: int,
     generation: int,
-    cost: Any,
-    arrival: Any,
-    stamp: Any,
+    landmark_cost: Any,
+    record: Any,
     head: Any,
-    following: Any,
-    entry: Any,
+    queue: Any,
 ) -> tuple[int, int, int]:
     """Find a shortest way from one cell to another by A* with a bucket queue.
 
@@ -104,100 +152,134 @@ def search_cells(
     start, goal : int
         Cells.
     generation : int
-        Even number, larger by 2 or more than in the last search with the same scratch.
-    cost : (cells,) int32
-        Scratch: cost from the start.
-    arrival : (cells,) uint8
-        Scratch and result: move by which each cell was reached.
-    stamp : (cells,) int32
-        Scratch: generation in which the cell was seen, plus 1 when it is done.
+        From 1 to `LAST_GENERATION`, larger than in all earlier searches with the same record.
+    landmark_cost : (L, cells) int32
+        Distance fields of some cells, which shorten the search; L may be 0.
+    record : (cells,) int64
+        Scratch and result for `trace_back`: generation, cost and arrival of each cell; at first
+        `FRESH_RECORD`.
     head : (256,) int32
         Scratch: newest entry of each bucket.
-    following, entry : (entries,) int32
-        Scratch: links and cells of queue entries.
+    queue : (entries,) int64
+        Scratch: cell and next entry of the same bucket.
 
     Returns
     -------
     status, cost, expansions : int
-        `FOUND`, `UNREACHABLE`, or `OVERFLOW` when there are too few entries.
+        `FOUND`, `UNREACHABLE`, or `OVERFLOW` when there are too few entries; cost in units of a straight
+        move / 70; cells taken from the queue.
 
     Notes
     -----
-    **Source:** Hart, Nilsson, Raphael, 1968; buckets after Dial, 1969. With the consistent octile heuristic f
-    grows by at most 198 along a move, so 256 circular buckets hold all open cells.
-    **Differs from the source:** newest first among equal f, which prefers deep cells; lazy deletion.
+    **Source:** Hart, Nilsson, Raphael, 1968; buckets after Dial, 1969; landmarks after Goldberg, Harrelson,
+    "Computing the shortest path: A* search meets graph theory", 2005; pruned moves after Harabor, Grastien,
+    "Online graph pruning for pathfinding on grid maps", 2011, and Sturtevant, Rabin, "Canonical orderings on
+    grids", 2016. With a consistent estimate f grows by at most 198 along a move, so 256 circular buckets hold
+    all open cells.
+    **Differs from the source:** no jumps, and pruning reads the move masks, so that thin walls may lie
+    between cells; of equal f the newest first, which prefers deep cells and needs no queue; lazy deletion;
+    one record holds generation, cost and arrival such that the smaller record is the better.
     """
     for bucket in range(BUCKETS):
         head[bucket] = -1
-    used = 1
-    waiting = 1
-    expansions = 0
-    f = octile(columns, start, goal)
-    cost[start] = 0
-    stamp[start] = generation
-    head[f & 255] = 0
-    following[0] = -1
-    entry[0] = start
+    prefix = np.int64(LAST_GENERATION - generation) << 32
     goal_column = goal % columns
     goal_row = goal // columns
-    while waiting > 0:
-        while head[f & 255] < 0:
-            f += 1
-        top = head[f & 255]
-        head[f & 255] = following[top]
-        waiting -= 1
-        cell = entry[top]
-        if stamp[cell] == generation + 1:
+    landmark = best_landmark(landmark_cost, start, goal)
+    goal_mark = np.int64(0)
+    f = np.int64(octile(columns, start, goal))
+    if landmark >= 0:
+        goal_mark = np.int64(landmark_cost[landmark, goal])
+        f = max(f, abs(landmark_cost[landmark, start] - goal_mark))
+    # Costs are stored plus 1: 0 is left for cells that are done, which no cost can improve.
+    record[start] = prefix | (1 << 4) | ANY_MOVE
+    used = 0
+    waiting = 0
+    expansions = 0
+    held = np.int64(start)
+    while True:
+        if held >= 0:
+            cell = held
+            held = np.int64(-1)
+        elif waiting == 0:
+            return UNREACHABLE, 0, expansions
+        else:
+            top = head[f & 255]
+            while top < 0:
+                f += 1
+                top = head[f & 255]
+            head[f & 255] = np.int32(queue[top] & 0xFFFFFFFF)
+            cell = queue[top] >> 32
+            waiting -= 1
+        word = record[cell] & 0xFFFFFFFF
+        reached = word >> 4
+        if reached == 0:
             continue
-        stamp[cell] = generation + 1
         expansions += 1
+        record[cell] = prefix | (word & 15)
         if cell == goal:
-            return FOUND, int(cost[cell]), expansions
-        moves = mask[cell]
-        reached = cost[cell]
-        column = cell % columns
+            return FOUND, reached - 1, expansions
         row = cell // columns
-        for move in range(8):
-            if not (moves >> move) & 1:
-                continue
+        across = cell - row * columns - goal_column
+        along = row - goal_row
+        moves = USEFUL_MOVES[word & 15, mask[cell]]
+        for index in range(MOVE_COUNT[moves]):
+            move = MOVE_LIST[moves, index]
             other = cell + COLUMN_STEP[move] + ROW_STEP[move] * columns
-            seen = stamp[other]
-            if seen == generation + 1:
+            cost = reached + MOVE_COST[move]
+            new_record = prefix | (cost << 4) | move
+            if new_record >= record[other]:
                 continue
-            new_cost = reached + MOVE_COST[move]
-            if seen == generation and cost[other] <= new_cost:
-                continue
-            if used >= entry.shape[0]:
+            record[other] = new_record
+            x = abs(across + COLUMN_STEP[move])
+            z = abs(along + ROW_STEP[move])
+            estimate = STRAIGHT * max(x, z) + (DIAGONAL - STRAIGHT) * min(x, z)
+            if landmark >= 0:
+                estimate = max(estimate, abs(landmark_cost[landmark, other] - goal_mark))
+            new_f = cost - 1 + estimate
+            if new_f == f:
+                other, held = held, other
+                if other < 0:
+                    continue
+            if used >= queue.shape[0]:
                 return OVERFLOW, 0, expansions
-            cost[other] = new_cost
-            stamp[other] = generation
-            arrival[other] = move
-            across = abs(column + COLUMN_STEP[move] - goal_column)
-            along = abs(row + ROW_STEP[move] - goal_row)
-            estimate = new_cost + STRAIGHT * max(across, along) + (DIAGONAL - STRAIGHT) * min(across, along)
-            bucket = estimate & 255
-            entry[used] = other
-            following[used] = head[bucket]
+            bucket = new_f & 255
+            queue[used] = (other << 32) | np.int64(np.uint32(head[bucket]))
             head[bucket] = used
             used += 1
             waiting += 1
-    return UNREACHABLE, 0, expansions
 
 
 @kernel
-def trace_back(arrival: Any, columns: int, start: int, goal: int, out_cells: Any) -> int:
-    """Write the cells of a way that was found, goal first; returns their number, or 0 without room."""
+def trace_back(record: Any, columns: int, goal: int, out_cells: Any) -> int:
+    """Write the cells of a way that was found, goal first.
+
+    Parameters
+    ----------
+    record : (cells,) int64
+        Left by `search_cells`.
+    columns : int
+        Cells in a row.
+    goal : int
+        Cell.
+    out_cells : (L,) int32
+        Cells of the way.
+
+    Returns
+    -------
+    int
+        Number of cells; 0 when there is too little room.
+    """
     cell = goal
     count = 0
-    while True:
-        if count >= out_cells.shape[0]:
-            return 0
+    while count < out_cells.shape[0]:
         out_cells[count] = cell
         count += 1
-        if cell == start:
+        move = record[cell] & 15
+        if move == ANY_MOVE:
             return count
-        move = arrival[cell]
         cell -= COLUMN_STEP[move] + ROW_STEP[move] * columns
+    return 0
 
 
 @parallel_kernel
@@ -207,12 +289,10 @@ def search_ways(
     start: Any,
     goal: Any,
     generation: int,
-    cost: Any,
-    arrival: Any,
-    stamp: Any,
+    landmark_cost: Any,
+    record: Any,
     head: Any,
-    following: Any,
-    entry: Any,
+    queue: Any,
     out_status: Any,
     out_length: Any,
     out_expansions: Any,
@@ -228,12 +308,14 @@ def search_ways(
     start, goal : (Q,) int32
         Cells.
     generation : int
-        Even, larger than any used with this scratch by 2 or more; query q uses ``generation + 2 q``.
-    cost, arrival, stamp : (chunks, cells)
-        Scratch of int32, uint8, int32.
+        Query q uses ``generation + q``, see `search_cells`.
+    landmark_cost : (L, cells) int32
+        See `search_cells`.
+    record : (chunks, cells) int64
+        Scratch, see `search_cells`.
     head : (chunks, 256) int32
         Scratch.
-    following, entry : (chunks, entries) int32
+    queue : (chunks, entries) int64
         Scratch.
     out_status : (Q,) int32
         See `search_cells`.
@@ -246,22 +328,21 @@ def search_ways(
     -----
     **Source:** see `search_cells`.
     """
-    chunks = cost.shape[0]
+    chunks = record.shape[0]
     count = start.shape[0]
-    for chunk in prange(chunks):
+    for k in prange(chunks):
+        chunk = (k * 37) % chunks
         for query in range(chunk * count // chunks, (chunk + 1) * count // chunks):
             status, _, expansions = search_cells(
                 mask,
                 columns,
                 start[query],
                 goal[query],
-                generation + 2 * query,
-                cost[chunk],
-                arrival[chunk],
-                stamp[chunk],
+                generation + query,
+                landmark_cost,
+                record[chunk],
                 head[chunk],
-                following[chunk],
-                entry[chunk],
+                queue[chunk],
             )
             out_status[query] = status
             out_expansions[query] = expansions
@@ -270,167 +351,12 @@ def search_ways(
                 straight = 0
                 diagonal = 0
                 cell = goal[query]
-                while cell != start[query]:
-                    move = arrival[chunk, cell]
+                move = record[chunk, cell] & 15
+                while move != ANY_MOVE:
                     if move < 4:
                         straight += 1
                     else:
                         diagonal += 1
                     cell -= COLUMN_STEP[move] + ROW_STEP[move] * columns
+                    move = record[chunk, cell] & 15
                 out_length[query] = straight + diagonal * math.sqrt(2.0)
-
-
-@kernel
-def fill_field(
-    mask: Any, columns: int, goals: Any, head: Any, following: Any, entry: Any, out_cost: Any
-) -> int:
-    """Compute the cost from every cell to the nearest of some goal cells.
-
-    Parameters
-    ----------
-    mask : (cells,) uint8
-        Moves of each cell; moves must be possible both ways.
-    columns : int
-        Cells in a row.
-    goals : (G,) int32
-        Goal cells.
-    head : (256,) int32
-        Scratch.
-    following, entry : (entries,) int32
-        Scratch.
-    out_cost : (cells,) int32
-        70 for a straight move, 99 for a diagonal one; `UNSEEN` where no goal can be reached.
-
-    Returns
-    -------
-    int
-        `FOUND`, or `OVERFLOW` when there are too few entries.
-
-    Notes
-    -----
-    **Source:** Dial, "Algorithm 360: shortest-path forest with topological ordering", 1969.
-    """
-    for bucket in range(BUCKETS):
-        head[bucket] = -1
-    out_cost[:] = UNSEEN
-    used = 0
-    for index in range(goals.shape[0]):
-        out_cost[goals[index]] = 0
-        entry[used] = goals[index]
-        following[used] = head[0]
-        head[0] = used
-        used += 1
-    waiting = used
-    reached = 0
-    while waiting > 0:
-        while head[reached & 255] < 0:
-            reached += 1
-        top = head[reached & 255]
-        head[reached & 255] = following[top]
-        waiting -= 1
-        cell = entry[top]
-        if out_cost[cell] != reached:
-            continue
-        moves = mask[cell]
-        for move in range(8):
-            if not (moves >> move) & 1:
-                continue
-            other = cell + COLUMN_STEP[move] + ROW_STEP[move] * columns
-            new_cost = reached + MOVE_COST[move]
-            if new_cost < out_cost[other]:
-                if used >= entry.shape[0]:
-                    return OVERFLOW
-                out_cost[other] = new_cost
-                bucket = new_cost & 255
-                entry[used] = other
-                following[used] = head[bucket]
-                head[bucket] = used
-                used += 1
-                waiting += 1
-    return FOUND
-
-
-@kernel
-def descend(mask: Any, columns: int, field: Any, start: int, out_cells: Any) -> int:
-    """Write the cells from a start down a distance field to its goal; returns their number.
-
-    Parameters
-    ----------
-    mask : (cells,) uint8
-        Moves of each cell.
-    columns : int
-        Cells in a row.
-    field : (cells,) int32
-        Costs of `fill_field`.
-    start : int
-        Cell.
-    out_cells : (L,) int32
-        Start first; the way is cut when there is no more room.
-
-    Returns
-    -------
-    int
-        Cells written; 0 when the start is cut off from the goal.
-    """
-    if field[start] >= UNSEEN:
-        return 0
-    cell = start
-    count = 0
-    while count < out_cells.shape[0]:
-        out_cells[count] = cell
-        count += 1
-        if field[cell] == 0:
-            break
-        best = -1
-        for move in range(8):
-            if (mask[cell] >> move) & 1:
-                other = cell + COLUMN_STEP[move] + ROW_STEP[move] * columns
-                if field[other] + MOVE_COST[move] == field[cell]:
-                    best = other
-                    break
-        if best < 0:
-            break
-        cell = best
-    return count
-
-
-@kernel
-def label_components(mask: Any, columns: int, out_label: Any) -> None:
-    """Number the connected parts of a grid; cells without moves keep their own number.
-
-    Parameters
-    ----------
-    mask : (cells,) uint8
-        Moves of each cell.
-    columns : int
-        Cells in a row.
-    out_label : (cells,) int32
-        Smallest cell of the part that each cell belongs to.
-
-    Notes
-    -----
-    **Source:** union-find with path halving (Tarjan, van Leeuwen, 1984).
-    """
-    for cell in range(mask.shape[0]):
-        out_label[cell] = cell
-    for cell in range(mask.shape[0]):
-        for move in range(8):
-            if not (mask[cell] >> move) & 1:
-                continue
-            a = cell
-            while out_label[a] != a:
-                out_label[a] = out_label[out_label[a]]
-                a = out_label[a]
-            b = cell + COLUMN_STEP[move] + ROW_STEP[move] * columns
-            while out_label[b] != b:
-                out_label[b] = out_label[out_label[b]]
-                b = out_label[b]
-            if a < b:
-                out_label[b] = a
-            else:
-                out_label[a] = b
-    for cell in range(mask.shape[0]):
-        a = cell
-        while out_label[a] != a:
-            a = out_label[a]
-        out_label[cell] = a
