@@ -33,9 +33,9 @@ IntArray = npt.NDArray[np.int32]
 class AvoidanceSettings:
     """How characters avoid each other; every field can be set in a scenario."""
 
-    neighbour_count: int = 10
+    neighbor_count: int = 10
     """Nearest others that a character avoids, 1 to 64. More is smoother in dense crowds and slower."""
-    neighbour_distance: float = 5.0
+    neighbor_distance: float = 5.0
     """Others farther away are ignored, m, 0.5 to 50. A larger value gives earlier reactions in open scenes
     and costs time there; in dense crowds the count is reached first."""
     time_horizon: float = 2.0
@@ -80,8 +80,8 @@ class AvoidanceSettings:
 
 
 _RANGES: dict[str, tuple[float, float]] = {
-    "neighbour_count": (1, 64),
-    "neighbour_distance": (0.5, 50.0),
+    "neighbor_count": (1, 64),
+    "neighbor_distance": (0.5, 50.0),
     "time_horizon": (0.1, 10.0),
     "wall_time_horizon": (0.1, 5.0),
     "contact_horizon": (0.01, 1.0),
@@ -145,12 +145,12 @@ class Avoidance:
     def __init__(self, settings: AvoidanceSettings, capacity: int) -> None:
         self.settings = settings
         self.capacity = capacity
-        wanted = max(settings.neighbour_count, MOST_EDGES, MOST_PARTNERS)
-        self._steer_cells = CellTable(capacity, 0.25, settings.neighbour_distance)
+        wanted = max(settings.neighbor_count, MOST_EDGES, MOST_PARTNERS)
+        self._steer_cells = CellTable(capacity, 0.25, settings.neighbor_distance)
         self._contact_cells = CellTable(capacity, 0.25, 4.0)
         self._body = np.zeros(BODY_COLUMNS * capacity)
         self._keys = np.zeros((CHUNKS, wanted), np.int64)
-        line_count = settings.neighbour_count + MOST_EDGES
+        line_count = settings.neighbor_count + MOST_EDGES
         self._lines = np.zeros((CHUNKS, 4 * line_count))
         self._projected = np.zeros((CHUNKS, 4 * line_count))
         self._partner = np.zeros((capacity, MOST_PARTNERS), np.int32)
@@ -166,8 +166,8 @@ class Avoidance:
     def _limits(self, dt: float) -> AvoidanceLimits:
         settings = self.settings
         return AvoidanceLimits(
-            settings.neighbour_count,
-            settings.neighbour_distance,
+            settings.neighbor_count,
+            settings.neighbor_distance,
             settings.time_horizon,
             settings.wall_time_horizon,
             max(settings.contact_horizon, dt),
@@ -216,7 +216,7 @@ class Avoidance:
         cells = self._steer_cells
         out_velocity_world[active, 0] = 0.0
         out_velocity_world[active, 2] = 0.0
-        cells.sort(position_world, radius, active, self.settings.neighbour_distance)
+        cells.sort(position_world, radius, active, self.settings.neighbor_distance)
         gather_bodies_crowd(
             cells.character,
             cells.sorted_count,
@@ -266,16 +266,16 @@ class Avoidance:
             m; only to leave out characters that have none.
         active : (A,) int32
         count : int, optional
-            Largest number for each; `neighbour_count` of the settings when left out.
+            Largest number for each; `neighbor_count` of the settings when left out.
         distance : float, optional
-            Only others nearer than this, m; `neighbour_distance` of the settings when left out.
+            Only others nearer than this, m; `neighbor_distance` of the settings when left out.
 
         Returns
         -------
         Neighbors
         """
-        wanted = count or self.settings.neighbour_count
-        reach = distance or self.settings.neighbour_distance
+        wanted = count or self.settings.neighbor_count
+        reach = distance or self.settings.neighbor_distance
         cells = self._steer_cells
         cells.sort(position_world, radius, active, reach)
         found = Neighbors(

@@ -67,6 +67,10 @@ def find_pairs_crowd(
         Written in rows of sorted characters: partners with larger numbers, nearest first.
     out_partner_count : (N,) int32
         How many.
+
+    Notes
+    -----
+    **Source:** cell lists as in `crowd_kernels.neighbors`; each pair is kept by its smaller number.
     """
     for k in prange(CHUNKS):
         chunk = (k * 37) % CHUNKS

@@ -6,22 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from crowd_kernels._jit import kernel, parallel_kernel, prange
-from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
 from crowd_kernels.gait import HEEL, SWING
 from crowd_kernels.limb_ik import bend_rotations, turned
 from crowd_kernels.locomotion import ease, wrapped_angle
-from crowd_kernels.quaternion import (
-    Quaternion,
-    Vector,
-    add,
-    conjugate,
-    from_yaw,
-    multiply,
-    normalized,
-    rotate,
-    subtract,
-)
+from crowd_kernels.pose import joint_rotation, set_joint_rotation
+from crowd_kernels.quaternion import Quaternion, conjugate, from_yaw, multiply, normalized, rotate
+from crowd_kernels.vector import Vector, add, subtract
 
 CHUNKS = 32
 TWO = np.float64(2.0)
@@ -61,34 +52,14 @@ class LockLimits(NamedTuple):
     """Rate at which the pelvis is lowered for feet out of reach, 1/s."""
 
 
-@kernel
-def joint_rotation(row: Any, joint: int) -> Quaternion:
-    """Read the local rotation of a joint from a pose row of (256,)."""
-    return (
-        float(row[joint]),
-        float(row[PADDED_JOINTS + joint]),
-        float(row[2 * PADDED_JOINTS + joint]),
-        float(row[3 * PADDED_JOINTS + joint]),
-    )
-
-
-@kernel
-def set_joint_rotation(row: Any, joint: int, q: Quaternion) -> None:
-    """Write the local rotation of a joint into a pose row of (256,)."""
-    row[joint] = q[0]
-    row[PADDED_JOINTS + joint] = q[1]
-    row[2 * PADDED_JOINTS + joint] = q[2]
-    row[3 * PADDED_JOINTS + joint] = q[3]
-
-
-@kernel
+@inlined_kernel
 def scaled_offset(legs: LegArrays, leg: int, part: int, scale: Any) -> Vector:
     """Find the rest offset of a leg joint in a character's own proportions."""
     s = float(scale[legs.segment[leg, part]])
     return legs.offset[leg, part, 0] * s, legs.offset[leg, part, 1] * s, legs.offset[leg, part, 2] * s
 
 
-@kernel
+@inlined_kernel
 def sole_point(legs: LegArrays, leg: int, point: int, scale: Any) -> Vector:
     """Find a point of the sole in a character's own proportions: 0 heel, 1 ball, 2 tip."""
     s = float(scale[legs.foot_segment])
@@ -101,7 +72,7 @@ def heading_of(q: Quaternion) -> float:
     return math.atan2(TWO * (q[1] * q[3] + q[0] * q[2]), 1.0 - TWO * (q[1] * q[1] + q[2] * q[2]))
 
 
-@kernel
+@inlined_kernel
 def plan_foot(
     character: int,
     leg: int,
@@ -209,7 +180,7 @@ def plan_foot(
     contact[character, leg] = wanted
 
 
-@kernel
+@inlined_kernel
 def lock_character(
     character: int,
     legs: LegArrays,

@@ -8,8 +8,8 @@ from crowd_kernels.locomotion import ease
 from crowd_kernels.random import uniform
 
 CHUNKS = 32
-PURPOSE_IDLE_CLIP = 101
-PURPOSE_IDLE_DWELL = 102
+PURPOSE_IDLE_CLIP = 171
+PURPOSE_IDLE_DWELL = 172
 
 
 @kernel

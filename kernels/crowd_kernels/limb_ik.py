@@ -4,20 +4,8 @@ import math
 from typing import Any
 
 from crowd_kernels._jit import kernel, parallel_kernel, prange
-from crowd_kernels.quaternion import (
-    Quaternion,
-    Vector,
-    add,
-    between,
-    cross,
-    dot,
-    multiply,
-    norm,
-    normalized,
-    rotate,
-    scaled,
-    subtract,
-)
+from crowd_kernels.quaternion import Quaternion, between, multiply, normalized, rotate
+from crowd_kernels.vector import Vector, add, cross, dot, norm, scaled, subtract
 
 CHUNKS = 32
 REACHED = 0

@@ -7,13 +7,13 @@ A line is four numbers: a point x, z and a unit direction x, z; velocities on it
 import math
 from typing import Any
 
-from crowd_kernels._jit import kernel
+from crowd_kernels._jit import inlined_kernel
 
 PARALLEL = 1e-5
 """Sine of the angle below which two lines count as parallel."""
 
 
-@kernel
+@inlined_kernel
 def violation(lines: Any, index: int, vx: float, vz: float) -> float:
     """Measure how far a velocity lies on the wrong side of a line.
 
@@ -36,7 +36,7 @@ def violation(lines: Any, index: int, vx: float, vz: float) -> float:
     return float(dx * (lines[first + 1] - vz) - dz * (lines[first] - vx))
 
 
-@kernel
+@inlined_kernel
 def solve_on_line(lines: Any, index: int, speed: float, x: float, z: float, goes_far: bool) -> Any:
     """Find the best velocity on one line that satisfies the lines before it.
 
@@ -87,7 +87,7 @@ def solve_on_line(lines: Any, index: int, speed: float, x: float, z: float, goes
     return True, px + place * dx, pz + place * dz
 
 
-@kernel
+@inlined_kernel
 def solve_nearest(lines: Any, line_count: int, speed: float, x: float, z: float, goes_far: bool) -> Any:
     """Find the admissible velocity nearest to a preferred one, line by line.
 
@@ -130,7 +130,7 @@ def solve_nearest(lines: Any, line_count: int, speed: float, x: float, z: float,
     return line_count, vx, vz
 
 
-@kernel
+@inlined_kernel
 def solve_least_violation(
     lines: Any,
     line_count: int,

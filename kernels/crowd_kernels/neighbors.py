@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
 
 CHUNKS = 32
 NUMBER_BITS = 32
@@ -18,7 +18,7 @@ ROUNDED_UP = 1.0 + 1e-6
 """Squared distances in keys are rounded; bounds made from them are widened by this."""
 
 
-@kernel
+@inlined_kernel
 def neighbor_key(squared_distance: float, number: int) -> int:
     """Pack distance and number into one integer that sorts by distance, then by number.
 
@@ -38,7 +38,7 @@ def neighbor_key(squared_distance: float, number: int) -> int:
     return (bits << NUMBER_BITS) | np.int64(number)  # type: ignore[return-value]
 
 
-@kernel
+@inlined_kernel
 def squared_distance_of(key: int) -> float:
     """Read the squared distance from a key.
 
@@ -55,7 +55,7 @@ def squared_distance_of(key: int) -> float:
     return np.float64(np.int32(key >> NUMBER_BITS).view(np.float32))
 
 
-@kernel
+@inlined_kernel
 def insert_run(
     point: Any,
     character: Any,
@@ -120,7 +120,7 @@ def insert_run(
     return found, limit_key
 
 
-@kernel
+@inlined_kernel
 def insert_row(
     cell_start: Any,
     point: Any,
@@ -179,7 +179,7 @@ def insert_row(
     return found, limit_key
 
 
-@kernel
+@inlined_kernel
 def find_nearest(
     cell_start: Any,
     point: Any,
@@ -306,6 +306,12 @@ def find_neighbors_crowd(
         Their distances, m, rounded to float32.
     out_neighbor_count : (N,) int32
         How many were found.
+
+    Notes
+    -----
+    **Source:** ring search over sorted cells (Green, "Particle simulation using CUDA", 2010, section 3).
+    **Differs from the source:** rings end as soon as nothing nearer can follow, and ties go to the smaller
+    number.
     """
     wanted = out_neighbor.shape[1]
     for k in prange(CHUNKS):

@@ -100,6 +100,11 @@ def rank_waiting_crowd(
         In and out, m/s; turned for those who have waited very long.
     responsibility, mobility : (N,) float64
         In and out: reduced for those who wait and have a high rank.
+
+    Notes
+    -----
+    **Source:** own; random priorities that change over time break symmetric waiting as random back-off
+    does in shared media (Metcalfe, Boggs, 1976).
     """
     count = active.shape[0]
     for k in prange(CHUNKS):

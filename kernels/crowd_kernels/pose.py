@@ -290,7 +290,7 @@ def local_rotations(pose_rotation: Any, active: Any, scratch: Any, out_rotation_
         )
 
 
-@kernel
+@inlined_kernel
 def joint_rotation(pose_row: Any, joint: int) -> Quaternion:
     """Read the local rotation of a joint.
 
@@ -313,7 +313,7 @@ def joint_rotation(pose_row: Any, joint: int) -> Quaternion:
     )
 
 
-@kernel
+@inlined_kernel
 def set_joint_rotation(pose_row: Any, joint: int, rotation: Quaternion) -> None:
     """Write the local rotation of a joint.
 

@@ -6,13 +6,7 @@ Arguments named `q`, `a` and `b` are unit quaternions unless stated otherwise; `
 import math
 
 from crowd_kernels._jit import kernel
-from crowd_kernels.vector import Vector as Vector
-from crowd_kernels.vector import add as add
-from crowd_kernels.vector import cross as cross
-from crowd_kernels.vector import dot as dot
-from crowd_kernels.vector import norm as norm
-from crowd_kernels.vector import scaled as scaled
-from crowd_kernels.vector import subtract as subtract
+from crowd_kernels.vector import Vector, cross, dot, norm, scaled
 
 Quaternion = tuple[float, float, float, float]
 

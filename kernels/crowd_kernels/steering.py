@@ -77,6 +77,10 @@ def gather_bodies_crowd(
         In [0, 1]; not finite counts as 0.5.
     out_body : (>= BODY_COLUMNS S,) float64
         Written: BODY_COLUMNS numbers for each slot.
+
+    Notes
+    -----
+    **Source:** structure of arrays in cell order, so that neighbours lie side by side in memory.
     """
     for k in prange(CHUNKS):
         for slot in range(k * sorted_count // CHUNKS, (k + 1) * sorted_count // CHUNKS):
@@ -377,11 +381,12 @@ def steer_chunk(
 
     Parameters
     ----------
-    cell_start, point, character, slot_of_character, body, columns, rows, cell_size, walls, limits, dt, seed
+    cell_start, point, character, slot_of_character, body
         See `steer_crowd`.
     begin, end : int
         Run of slots.
-    step : int
+    columns, rows, cell_size, walls, limits, dt, seed, step
+        See `steer_crowd`.
     keys : (>= max(K, MOST_EDGES),) int64
         Scratch.
     lines, projected : (>= 4 (K + MOST_EDGES),) float64

@@ -132,6 +132,10 @@ def find_places(
         1 where the body fits.
     out_point : (cells, 2) float64
         Place in the cell where the body fits best, m.
+
+    Notes
+    -----
+    **Source:** exact distances to the wall segments near each cell, at a raster of points.
     """
     half_diagonal = 0.7072 * grid.cell_size
     for row in prange(first_row, last_row):
@@ -199,6 +203,10 @@ def link_places(
     out_link : (cells,) uint8
         Bits: 1 to the next column, 2 to the next row, 4 both diagonals between this cell and the one in the
         next row and column.
+
+    Notes
+    -----
+    **Source:** exact distances of straight ways between places from the wall segments near them.
     """
     for row in prange(first_row, last_row):
         for column in range(first_column, last_column):

@@ -272,7 +272,7 @@ def test_avoidance_can_be_set_as_the_engine_knows_it(tmp_path: Path) -> None:
         ("time_horizn = 3.0", 'time_horizn: unknown key; allowed "time_horizon", '),
         ("time_horizon = -1.0", "time_horizon: is out of range; got -1.0; allowed 0.1 to 10"),
         ("time_horizon = nan", "time_horizon: is out of range; got nan; allowed 0.1 to 10"),
-        ("neighbour_count = 2.5", "neighbour_count: must be a whole number; got 2.5; allowed a whole number"),
+        ("neighbor_count = 2.5", "neighbor_count: must be a whole number; got 2.5; allowed a whole number"),
         ('time_horizon = "long"', "time_horizon: must be a number; got 'long'; allowed a number"),
     ],
 )

@@ -61,49 +61,6 @@ every_kernel = pytest.mark.parametrize("kernel", KERNELS, ids=str)
 every_driver = pytest.mark.parametrize("kernel", DRIVERS, ids=str)
 
 
-# What is still to be done, rule by rule. A line goes when its work is done; none may be added.
-OPEN: dict[str, set[str]] = {
-    "arguments": {"steering.steer_chunk"},
-    "source": {
-        "contact.find_pairs_crowd",
-        "neighbors.find_neighbors_crowd",
-        "patience.rank_waiting_crowd",
-        "steering.gather_bodies_crowd",
-    },
-    "twin": set(),
-    "case": {
-        "contact.find_pairs_crowd",
-        "foot_lock.lock_feet_crowd",
-        "layers.idle_crowd",
-        "layers.play_crowd",
-        "limb_ik.crowd_two_bone_ik",
-        "locomotion.approach_crowd",
-        "locomotion.gait_crowd",
-        "locomotion.integrate_root_crowd",
-        "locomotion.prefer_crowd",
-        "locomotion.wish_crowd",
-        "neighbors.find_neighbors_crowd",
-        "patience.rank_waiting_crowd",
-        "routing.follow_crowd",
-        "steering.gather_bodies_crowd",
-        "steering.steer_crowd",
-    },
-}
-
-
-@pytest.fixture
-def expect_open(request):
-    """Mark the test of a kernel that is known to break a rule as an expected failure."""
-
-    def mark(rule, kernel):
-        if str(kernel) in OPEN[rule]:
-            request.applymarker(
-                pytest.mark.xfail(strict=False, reason=f"{kernel}: {rule} still to be written")
-            )
-
-    return mark
-
-
 def calls(tree):
     """Names of what a tree calls, such as ``np.zeros``."""
     return [ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)]
@@ -188,8 +145,7 @@ def test_docstrings_begin_with_one_imperative_line(kernel):
 
 
 @every_kernel
-def test_documented_arguments_are_those_of_the_signature(kernel, expect_open):
-    expect_open("arguments", kernel)
+def test_documented_arguments_are_those_of_the_signature(kernel):
     documented = documented_arguments(kernel.docstring)
     if kernel.is_driver:
         assert documented == kernel.arguments
@@ -199,8 +155,7 @@ def test_documented_arguments_are_those_of_the_signature(kernel, expect_open):
 
 
 @every_driver
-def test_drivers_state_their_source(kernel, expect_open):
-    expect_open("source", kernel)
+def test_drivers_state_their_source(kernel):
     assert "**Source:**" in kernel.docstring
 
 
@@ -244,18 +199,12 @@ def reaches(text, driver):
 
 
 @every_driver
-def test_every_driver_is_tested_beside_a_slow_twin(kernel, expect_open):
-    expect_open("twin", kernel)
+def test_every_driver_is_tested_beside_a_slow_twin(kernel):
     tests = [text for text in TESTS.values() if reaches(text, kernel.tree.name)]
     assert tests, "no test reaches it"
     assert any("tests.oracles" in text for text in tests), "no test that reaches it uses a slow twin"
 
 
 @every_driver
-def test_every_driver_has_a_benchmark_case(kernel, expect_open):
-    expect_open("case", kernel)
+def test_every_driver_has_a_benchmark_case(kernel):
     assert any(reaches(text, kernel.tree.name) for text in CASES.values())
-
-
-def test_what_is_still_open_names_kernels_that_exist():
-    assert {name for names in OPEN.values() for name in names} <= {str(kernel) for kernel in KERNELS}
