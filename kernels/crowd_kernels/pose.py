@@ -10,7 +10,8 @@ import numpy as np
 from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.lanes import COMPONENT, LANES, gather_block, interleave, scatter_block
-from crowd_kernels.quaternion import Quaternion, Vector, multiply, rotate
+from crowd_kernels.quaternion import Quaternion, multiply, rotate
+from crowd_kernels.vector import Vector
 
 CHUNKS = 32
 TWO = np.float32(2.0)
