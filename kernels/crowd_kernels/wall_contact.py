@@ -32,6 +32,9 @@ MOST_PUSHES = 4
 LEAVING_SPEED = 2.0
 """Speed at which a character leaves the inside of a solid, m/s."""
 TOUCH_GAP = 1e-3
+ON_EDGE = 1e-6
+"""A point this near to the edge of a solid counts as inside, m."""
+THIN_MARGIN = 1e-7
 
 
 @kernel
@@ -142,7 +145,7 @@ def time_to_edge(edge: Any, index: int, x: float, z: float, dx: float, dz: float
 
 
 @kernel
-def slide(walls: WallTable, x: float, z: float, dx: float, dz: float, near: float) -> Any:
+def slide(walls: WallTable, x: float, z: float, dx: float, dz: float, near: float, most_slides: int) -> Any:
     """Move a point; where it meets a wall it slides along.
 
     Parameters
@@ -154,6 +157,8 @@ def slide(walls: WallTable, x: float, z: float, dx: float, dz: float, near: floa
         Motion, m; so short that the list of the start's cell holds every wall it can meet.
     near : float
         Distance to keep from walls, m.
+    most_slides : int
+        The motion ends where it meets a wall for this many times.
 
     Returns
     -------
@@ -161,7 +166,7 @@ def slide(walls: WallTable, x: float, z: float, dx: float, dz: float, near: floa
         x and z of the end, m.
     """
     begin, end = cell_list(walls, x, z)
-    for _ in range(MOST_SLIDES):
+    for _ in range(most_slides):
         first, away_x, away_z = math.inf, 0.0, 0.0
         for entry in range(begin, end):
             index = walls.cell_edge[entry]
@@ -191,8 +196,8 @@ def way_out_of_solid(walls: WallTable, x: float, z: float) -> Any:
 
     Returns
     -------
-    tuple of float
-        Depth, m, 0 when the point is in no solid or deeper than walls are listed; unit direction x, z out.
+    tuple
+        Whether the point is inside, as far as walls are listed; depth, m; unit direction x, z out.
     """
     begin, end = cell_list(walls, x, z)
     nearest, squared = -1, math.inf
@@ -204,10 +209,10 @@ def way_out_of_solid(walls: WallTable, x: float, z: float) -> Any:
         if candidate < squared:
             nearest, squared, is_interior = index, candidate, feature == FEATURE_INTERIOR
     if nearest < 0 or not is_interior or walls.edge[nearest, KIND] != SOLID:
-        return 0.0, 0.0, 0.0
-    if side_of_edge(walls.edge, nearest, x, z) > -1e-6:
-        return 0.0, 0.0, 0.0
-    return math.sqrt(squared), walls.edge[nearest, ALONG_Z], -walls.edge[nearest, ALONG_X]
+        return False, 0.0, 0.0, 0.0
+    if side_of_edge(walls.edge, nearest, x, z) > ON_EDGE:
+        return False, 0.0, 0.0, 0.0
+    return True, math.sqrt(squared), walls.edge[nearest, ALONG_Z], -walls.edge[nearest, ALONG_X]
 
 
 @kernel
@@ -239,8 +244,36 @@ def push_off_walls(walls: WallTable, x: float, z: float, near: float) -> Any:
         if distance >= near - 1e-9 or distance < 1e-9:
             return x, z
         scale = (near - distance) / distance
-        x, z = slide(walls, x, z, scale * away_x, scale * away_z, near)
+        x, z = slide(walls, x, z, scale * away_x, scale * away_z, near, MOST_SLIDES)
     return x, z
+
+
+@kernel
+def is_in_sight(
+    walls: WallTable, x: float, z: float, target_x: float, target_z: float, longest: float
+) -> bool:
+    """Tell whether the straight line between two points passes no wall.
+
+    Parameters
+    ----------
+    walls : WallTable
+    x, z, target_x, target_z : float
+        Points, m.
+    longest : float
+        The line is looked at in pieces of this length, at most `walls.reach`, m.
+
+    Returns
+    -------
+    bool
+    """
+    dx, dz = target_x - x, target_z - z
+    pieces = math.ceil(math.sqrt(dx * dx + dz * dz) / longest)
+    for piece in range(pieces):
+        from_x, from_z = x + dx * piece / pieces, z + dz * piece / pieces
+        end_x, end_z = slide(walls, from_x, from_z, dx / pieces, dz / pieces, THIN_MARGIN, 1)
+        if abs(end_x - from_x - dx / pieces) + abs(end_z - from_z - dz / pieces) > ON_EDGE:
+            return False
+    return True
 
 
 @kernel
@@ -273,8 +306,8 @@ def hold_at_walls(
     target_x, target_z = position_world[own, 0], position_world[own, 2]
     if not (is_point(x, z) and is_point(target_x, target_z)):
         return
-    depth, out_x, out_z = way_out_of_solid(walls, x, z)
-    if depth > 0.0:
+    is_inside, depth, out_x, out_z = way_out_of_solid(walls, x, z)
+    if is_inside:
         step = min(depth + radius, LEAVING_SPEED * dt)
         position_world[own, 0] = x + step * out_x
         position_world[own, 2] = z + step * out_z
@@ -284,11 +317,15 @@ def hold_at_walls(
     dx, dz = target_x - x, target_z - z
     length = math.sqrt(dx * dx + dz * dz)
     pieces = int(min(math.ceil(length / longest), float(MOST_PIECES)))
-    if pieces > 0:
-        share = min(1.0, longest * pieces / length) / pieces
-        for _ in range(pieces):
-            x, z = slide(walls, x, z, share * dx, share * dz, near)
+    share = min(1.0, longest * pieces / max(length, 1e-12)) / max(pieces, 1)
+    for _ in range(pieces):
+        x, z = slide(walls, x, z, share * dx, share * dz, near, MOST_SLIDES)
     x, z = push_off_walls(walls, x, z, near)
+    if x != target_x or z != target_z:
+        # Who slid round a corner must not have cut it; if so, the motion ends where it first met a wall.
+        start_x, start_z = previous_position_world[own, 0], previous_position_world[own, 2]
+        if not is_in_sight(walls, start_x, start_z, x, z, longest):
+            x, z = slide(walls, start_x, start_z, share * dx, share * dz, near, 1)
     position_world[own, 0] = x
     position_world[own, 2] = z
 
