@@ -135,17 +135,16 @@ def steerbench(
     threads: Threads = None,
 ) -> int:
     """Run SteerBench files with whole people and with plain discs, and print both scores."""
-    from crowd.bench.steerbench import find_files, print_results, run_file
+    from crowd.bench.steerbench import COLUMNS, find_files, row, run_file
 
-    console = Console(stderr=True)
     results = []
+    print(COLUMNS)
     for path in find_files(folder):
         if only not in path.stem:
             continue
         for bodies in ("people", "discs"):
-            with console.status(f"{path.stem}, {bodies}"):
-                results.append(run_file(path, bodies, threads))
-    print_results(results)
+            results.append(run_file(path, bodies, threads))
+            print(row(results[-1]), flush=True)
     return 0 if all(not result.problem for result in results if result.bodies == "people") else EXIT_FAILED
 
 

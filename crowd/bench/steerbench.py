@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from crowd.bench.steerbench_score import CLASSIC_RATE, Scores, SteerBenchScores
 from crowd.errors import SettingsError, describe
@@ -131,40 +129,18 @@ def find_files(folder: Path) -> list[Path]:
     return files
 
 
-def print_results(results: list[SteerBenchResult]) -> None:
-    """Print a row for each run."""
-    table = Table(box=None, pad_edge=False)
-    titles = (
-        "file",
-        "bodies",
-        "people",
-        "arrived",
-        "time s",
-        "limit s",
-        "ideal 01",
-        "01",
-        "02",
-        "free 01",
-        "free 02",
+COLUMNS = (
+    "file                    bodies  people arrived  time s limit s ideal 01       01       02  free 01"
+    "  free 02 collis. deepest m crossed  ok"
+)
+
+
+def row(result: SteerBenchResult) -> str:
+    """One run as a line below `COLUMNS`."""
+    classic, free = result.classic, result.step_free
+    return (
+        f"{result.name:23s} {result.bodies:6s} {result.characters:7d} {result.arrived:7.1%} "
+        f"{result.seconds:7.1f} {result.limit:7.0f} {result.ideal:8.1f} {classic.composite_01:8.1f} "
+        f"{classic.composite_02:8.1f} {free.composite_01:8.1f} {free.composite_02:8.1f} "
+        f"{free.collisions:7.2f} {result.deepest_m:9.3f} {result.crossings:7d}  {result.problem or 'yes'}"
     )
-    for title in (*titles, "collisions", "deepest m", "crossed", "ok"):
-        table.add_column(title, justify="left" if title in ("file", "bodies") else "right", no_wrap=True)
-    for result in results:
-        table.add_row(
-            result.name,
-            result.bodies,
-            str(result.characters),
-            f"{result.arrived:.1%}",
-            f"{result.seconds:.1f}",
-            f"{result.limit:.0f}",
-            f"{result.ideal:.1f}",
-            f"{result.classic.composite_01:.1f}",
-            f"{result.classic.composite_02:.1f}",
-            f"{result.step_free.composite_01:.1f}",
-            f"{result.step_free.composite_02:.1f}",
-            f"{result.step_free.collisions:.2f}",
-            f"{result.deepest_m:.3f}",
-            str(result.crossings),
-            "yes" if not result.problem else f"[red]{result.problem}[/]",
-        )
-    Console(width=max(Console().width, 150)).print(table)
