@@ -1,1 +1,1 @@
-"""TODO."""
+"""Where people go: ways, way points, avoidance, right of way."""

@@ -1,1 +1,1 @@
-"""Placeholder package of the renderer."""
+"""The renderer. This version holds no code yet; the engine runs without it."""
