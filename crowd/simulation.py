@@ -96,7 +96,7 @@ class Simulation:
         _jit.set_thread_count(self.threads)
         self.state = State.create(capacity)
         self.model.timetable.update(self.model.world, 0.0)
-        self.navigator = Navigator(self.model, avoidance_settings(scenario))
+        self.navigator = Navigator(self.model, avoidance_settings(scenario), turns_first=bodies == "people")
         self.population = Population(self.model, seed, self.navigator.routing)
         self.world_offset = WorldOffset()
         self.idle = Idle(capacity)

@@ -1,5 +1,6 @@
 """Where to and how fast: way points, preferred velocity, avoidance, and bodies kept apart."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,11 @@ SHORTEST_MAXIMUM_SPEED = 0.6
 class Navigator:
     """The navigate and steer stages of a frame, and the projection of overlaps."""
 
-    def __init__(self, model: Model, settings: AvoidanceSettings) -> None:
+    def __init__(self, model: Model, settings: AvoidanceSettings, *, turns_first: bool = True) -> None:
         capacity = model.capacity
         self.model = model
+        # Plain discs have no facing that could hold them back.
+        self._angles = (FULL_SPEED_ANGLE, NO_SPEED_ANGLE) if turns_first else (math.pi, 2.0 * math.pi)
         self.routing = Routing(model.world, capacity, shared_goals(model.placed))
         self.avoidance = Avoidance(settings, capacity)
         self.patience = Patience(capacity)
@@ -73,8 +76,7 @@ class Navigator:
             self._stays_at_goal,
             step.active,
             BRAKING_TIME,
-            FULL_SPEED_ANGLE,
-            NO_SPEED_ANGLE,
+            *self._angles,
             state.preferred_velocity_world,
         )
         self._responsibility[:] = np.where(state.wants_to_walk, 0.5, STANDING_RESPONSIBILITY)

@@ -185,7 +185,7 @@ def test_a_flow_brings_people_in_at_its_rate_and_takes_them_out():
 
 
 def test_discs_move_without_animation():
-    simulation = run_one(walker(), 12.0, bodies="discs")
+    simulation = run_one(walker(facing=180.0), 12.0, bodies="discs")
     assert simulation.is_finished
     assert simulation.state.locomotion_weight[0] == 0.0
 
