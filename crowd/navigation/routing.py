@@ -42,7 +42,7 @@ class RoutingSettings:
     """Characters with one goal from which on a distance field is cheaper than searches, >= 1."""
     widest_lane: float = 0.6
     """Largest distance that people on a way of their own keep from corners, m, >= 0; 0: all hug them."""
-    widest_shared_lane: float = 3.0
+    widest_shared_lane: float = 1.5
     """The same for those who share a goal, m, >= 0; larger: doors are used over more of their width."""
     most_fields: int = 32
     """Distance fields kept in memory, >= 1."""

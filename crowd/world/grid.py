@@ -131,6 +131,8 @@ class Grid:
         m.
     is_walkable : (cells,) uint8
         1 where the body fits.
+    room : (cells,) float64
+        Distance of the place in each cell from walls, at most the radius and a cell more, m.
     link : (cells,) uint8
         Between which cells it can go straight, see `crowd_kernels.walkable.link_places`.
     arrays : GroundGrid
@@ -142,6 +144,7 @@ class Grid:
     layout: Layout
     radius: float
     is_walkable: ByteArray
+    room: FloatArray
     link: ByteArray
     arrays: GroundGrid
     walls: WallTable
@@ -176,7 +179,8 @@ class Grid:
             layout.rows,
         )
         walls = wall_table(layout, edge, radius)
-        grid = cls(layout, radius, np.zeros(cells, np.uint8), np.zeros(cells, np.uint8), arrays, walls)
+        is_walkable, link = np.zeros((2, cells), np.uint8)
+        grid = cls(layout, radius, is_walkable, np.zeros(cells), link, arrays, walls)
         grid._measure(cover, layout.everything)
         return grid
 
@@ -242,13 +246,13 @@ class Grid:
         """Compute all arrays in a window and what depends on them."""
         first_column, last_column, first_row, last_row = window
         self._landmarks = None
-        find_places(self.arrays, self.walls, cover, *window, self.is_walkable, self.point)
+        find_places(self.arrays, self.walls, cover, *window, self.is_walkable, self.point, self.room)
         # A link belongs to its lower cell, a move to both.
         low_column, low_row = max(first_column - 1, 0), max(first_row - 1, 0)
         high_column = min(last_column + 1, self.layout.columns)
         high_row = min(last_row + 1, self.layout.rows)
         around = (low_column, high_column, low_row, high_row)
-        link_places(self.arrays, self.walls, self.is_walkable, *around, self.link)
+        link_places(self.arrays, self.walls, self.is_walkable, self.room, *around, self.link)
         mask_links(self.link, self.layout.columns, self.layout.rows, *around, self.mask)
         label_components(self.mask, self.layout.columns, self.component)
         self.component[self.is_walkable == 0] = -1
@@ -272,7 +276,8 @@ def wall_table(layout: Layout, edge: FloatArray, radius: float) -> WallTable:
     """List the walls near each square of cells, up to the radius and a cell more."""
     reach = radius + layout.cell_size
     size = layout.cell_size * CELLS_PER_LIST
-    columns, rows = -(-layout.columns // CELLS_PER_LIST), -(-layout.rows // CELLS_PER_LIST)
+    # One more than needed: the upper border of the ground belongs to the next square.
+    columns, rows = layout.columns // CELLS_PER_LIST + 1, layout.rows // CELLS_PER_LIST + 1
     place = (layout.low_x, layout.low_z, size, columns, rows, reach)
     cell_start = np.zeros(columns * rows + 1, np.int32)
     edge = np.ascontiguousarray(edge)

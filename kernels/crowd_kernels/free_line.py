@@ -108,7 +108,7 @@ def is_free_line(walls: WallTable, radius: float, x: float, z: float, to_x: floa
     Parameters
     ----------
     walls : WallTable
-        Lists reach at least to the radius.
+        Lists reach at least to the radius. Outside their cells nothing is in the way.
     radius : float
         m.
     x, z, to_x, to_z : float

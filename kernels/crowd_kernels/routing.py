@@ -14,6 +14,7 @@ from crowd_kernels.walls import WallTable
 
 CHUNKS = 32
 UNREACHABLE = 1
+PASSED = 0.25
 RETRY = 8
 """Characters without a way ask again after so many times the period."""
 
@@ -219,7 +220,7 @@ def look_ahead(
     index : int
         Corner that the character walks to.
     reach : float
-        A corner half as far counts as passed, one as far as hardly left, m.
+        A corner a quarter as far counts as passed, one as far as hardly left, m.
 
     Returns
     -------
@@ -233,7 +234,7 @@ def look_ahead(
         return found
     if is_free_line(walls, radius, x, z, corner[index, 0], corner[index, 1]):
         to_x, to_z = corner[index, 0] - x, corner[index, 1] - z
-        is_passed = to_x * to_x + to_z * to_z < 0.25 * reach * reach
+        is_passed = to_x * to_x + to_z * to_z < PASSED * PASSED * reach * reach
         return index + 1 if is_passed and index < last else index
     if index > 0 and is_free_line(walls, radius, x, z, corner[index - 1, 0], corner[index - 1, 1]):
         to_x, to_z = corner[index - 1, 0] - x, corner[index - 1, 1] - z

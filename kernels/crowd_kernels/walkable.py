@@ -21,6 +21,7 @@ SAMPLES = 5
 """Samples on a side of a cell."""
 CENTER_BIT = 12
 ROW_OF_SAMPLES = 31
+IMPROVEMENTS = 8
 MARGIN = 0.01
 """A gap may be narrower than the body by this much, m: rounding of what a user wrote."""
 LINK_COLUMN, LINK_ROW, LINK_DIAGONALS = 1, 2, 4
@@ -32,7 +33,7 @@ class GroundGrid(NamedTuple):
     mask: Any
     """(cells,) uint8: moves of each cell."""
     point: Any
-    """(cells, 2) float64: place in the cell where the body fits best, m."""
+    """(cells, 2) float64: place in the cell where the body fits, m."""
     component: Any
     """(cells,) int32: connected part of the grid; -1 where the body does not fit."""
     radius: float
@@ -105,6 +106,52 @@ def cover_samples(
                 out_inside[row, rest] ^= np.uint32(ROW_OF_SAMPLES << shift)
 
 
+@kernel
+def improve_place(
+    grid: GroundGrid, walls: WallTable, column: int, row: int, x: float, z: float, room: float
+) -> tuple[float, float, float]:
+    """Look around the best sample of a cell for a place with more room.
+
+    Parameters
+    ----------
+    grid : GroundGrid
+    walls : WallTable
+    column, row : int
+        The cell.
+    x, z : float
+        Best sample, m, outside all solids.
+    room : float
+        Distance from walls there, m.
+
+    Returns
+    -------
+    x, z, room : float
+        Best place found, inside the cell, and its distance from walls, m.
+
+    Notes
+    -----
+    **Source:** compass search (Kolda, Lewis, Torczon, "Optimization by direct search", 2003), from half the
+    distance of samples down to 1 / 32 of it.
+    """
+    low_x = grid.low_x + column * grid.cell_size
+    low_z = grid.low_z + row * grid.cell_size
+    high_x = min(low_x + grid.cell_size, grid.high_x)
+    high_z = min(low_z + grid.cell_size, grid.high_z)
+    step = 0.5 * grid.cell_size / SAMPLES
+    for _ in range(IMPROVEMENTS):
+        from_x, from_z = x, z
+        for move in range(4):
+            try_x = min(max(from_x + step * COLUMN_STEP[move], low_x), high_x)
+            try_z = min(max(from_z + step * ROW_STEP[move], low_z), high_z)
+            here = wall_distance(walls, try_x, try_z)
+            # A place farther from walls than the step is on the same side of all of them.
+            if here > room and here > step:
+                x, z, room = try_x, try_z, here
+        if x == from_x and z == from_z:
+            step *= 0.5
+    return x, z, room
+
+
 @parallel_kernel
 def find_places(
     grid: GroundGrid,
@@ -116,6 +163,7 @@ def find_places(
     last_row: int,
     out_is_walkable: Any,
     out_point: Any,
+    out_room: Any,
 ) -> None:
     """Find the cells of a window in which the body fits, and where in them.
 
@@ -131,11 +179,14 @@ def find_places(
     out_is_walkable : (cells,) uint8
         1 where the body fits.
     out_point : (cells, 2) float64
-        Place in the cell where the body fits best, m.
+        Place in the cell: its centre where the body fits there or nowhere, else where it has most room, m.
+    out_room : (cells,) float64
+        Distance of that place from walls, at most the radius and a cell more, m.
 
     Notes
     -----
-    **Source:** exact distances to the wall segments near each cell, at a raster of points.
+    **Source:** sampling of the configuration space of a disc (Lozano-Perez, "Spatial planning: a
+    configuration space approach", 1983).
     """
     half_diagonal = 0.7072 * grid.cell_size
     for row in prange(first_row, last_row):
@@ -145,7 +196,10 @@ def find_places(
             z = grid.low_z + (row + 0.5) * grid.cell_size
             out_point[cell, 0] = x
             out_point[cell, 1] = z
-            room = wall_distance(walls, x, z)
+            # Walls farther away count as equal, so that a cell depends on near ones only.
+            farthest = grid.radius + grid.cell_size
+            room = min(wall_distance(walls, x, z), farthest)
+            out_room[cell] = room
             is_free = ((cover[cell] >> CENTER_BIT) & 1) == 0 and x <= grid.high_x and z <= grid.high_z
             if is_free and room >= grid.radius:
                 out_is_walkable[cell] = 1
@@ -161,22 +215,36 @@ def find_places(
                 place_z = grid.low_z + (row + (sample // SAMPLES + 0.5) / SAMPLES) * grid.cell_size
                 if place_x > grid.high_x or place_z > grid.high_z:
                     continue
-                here = wall_distance(walls, place_x, place_z)
+                here = min(wall_distance(walls, place_x, place_z), farthest)
                 if here > best:
                     best = here
                     out_point[cell, 0] = place_x
                     out_point[cell, 1] = place_z
+            if grid.radius - grid.cell_size / SAMPLES < best < grid.radius:
+                place_x, place_z, best = improve_place(
+                    grid, walls, column, row, out_point[cell, 0], out_point[cell, 1], best
+                )
+                out_point[cell, 0] = place_x
+                out_point[cell, 1] = place_z
             if best >= grid.radius - MARGIN:
                 out_is_walkable[cell] = 1
+                out_room[cell] = best
+            else:
+                out_point[cell, 0] = x
+                out_point[cell, 1] = z
 
 
 @kernel
-def is_free_link(grid: GroundGrid, walls: WallTable, is_walkable: Any, a: int, b: int) -> bool:
+def is_free_link(grid: GroundGrid, walls: WallTable, is_walkable: Any, room: Any, a: int, b: int) -> bool:
     """Tell whether a body can go straight between its places in two neighbouring cells."""
     if not (is_walkable[a] and is_walkable[b]):
         return False
-    ax, az = grid.point[a, 0], grid.point[a, 1]
-    return is_free_line(walls, grid.radius, ax, az, grid.point[b, 0], grid.point[b, 1])
+    ax, az, bx, bz = grid.point[a, 0], grid.point[a, 1], grid.point[b, 0], grid.point[b, 1]
+    # Nowhere between two places is there less room than half of what they have beyond the way itself.
+    way = math.sqrt((bx - ax) * (bx - ax) + (bz - az) * (bz - az))
+    if room[a] + room[b] - way >= 2.0 * grid.radius:
+        return True
+    return is_free_line(walls, grid.radius, ax, az, bx, bz)
 
 
 @parallel_kernel
@@ -184,6 +252,7 @@ def link_places(
     grid: GroundGrid,
     walls: WallTable,
     is_walkable: Any,
+    room: Any,
     first_column: int,
     last_column: int,
     first_row: int,
@@ -198,6 +267,8 @@ def link_places(
     walls : WallTable
         Lists reach at least to the radius.
     is_walkable : (cells,) uint8
+    room : (cells,) float64
+        Room at the place in each cell, see `find_places`, m.
     first_column, last_column, first_row, last_row : int
         Window, last ones excluded.
     out_link : (cells,) uint8
@@ -206,7 +277,7 @@ def link_places(
 
     Notes
     -----
-    **Source:** exact distances of straight ways between places from the wall segments near them.
+    **Source:** local planner of a roadmap, see `crowd_kernels.free_line`.
     """
     for row in prange(first_row, last_row):
         for column in range(first_column, last_column):
@@ -214,15 +285,15 @@ def link_places(
             link = 0
             has_next_column = column + 1 < grid.columns
             has_next_row = row + 1 < grid.rows
-            if has_next_column and is_free_link(grid, walls, is_walkable, cell, cell + 1):
+            if has_next_column and is_free_link(grid, walls, is_walkable, room, cell, cell + 1):
                 link |= LINK_COLUMN
-            if has_next_row and is_free_link(grid, walls, is_walkable, cell, cell + grid.columns):
+            if has_next_row and is_free_link(grid, walls, is_walkable, room, cell, cell + grid.columns):
                 link |= LINK_ROW
             if (
                 has_next_column
                 and has_next_row
-                and is_free_link(grid, walls, is_walkable, cell, cell + grid.columns + 1)
-                and is_free_link(grid, walls, is_walkable, cell + 1, cell + grid.columns)
+                and is_free_link(grid, walls, is_walkable, room, cell, cell + grid.columns + 1)
+                and is_free_link(grid, walls, is_walkable, room, cell + 1, cell + grid.columns)
             ):
                 link |= LINK_DIAGONALS
             out_link[cell] = link
@@ -328,11 +399,8 @@ def nearest_cell(grid: GroundGrid, x: float, z: float, part: int, reach: float) 
     cell = row * grid.columns + column
     if grid.component[cell] >= 0 and (part < 0 or grid.component[cell] == part):
         return cell
-    outside_x = max(grid.low_x - x, x - grid.low_x - grid.columns * grid.cell_size, 0.0)
-    outside_z = max(grid.low_z - z, z - grid.low_z - grid.rows * grid.cell_size, 0.0)
-    limit = reach + outside_x + outside_z
     best = -1
-    least = limit * limit
+    least = reach * reach
     for ring in range(1, max(grid.columns, grid.rows)):
         bound = (ring - 1) * grid.cell_size
         if bound * bound > least:

@@ -1,5 +1,7 @@
 """The walkable world: doors that bodies fit through, thin walls, obstacles that come and go, ways."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -15,8 +17,8 @@ def points(*places):
     return np.array([[x, 0.0, z] for x, z in places])
 
 
-@pytest.mark.parametrize("shift", np.linspace(0, 0.25, 8))
-@pytest.mark.parametrize(("gap", "fits"), [(1.2, True), (1.05, True), (0.95, False), (0.5, False)])
+@pytest.mark.parametrize("shift", np.linspace(0, 0.25, 20))
+@pytest.mark.parametrize(("gap", "fits"), [(1.2, True), (1.02, True), (0.95, False), (0.5, False)])
 def test_a_door_lets_bodies_through_wherever_the_grid_lies(shift, gap, fits):
     walls = [Box(-10.0, shift - gap / 2, -0.2, 0.2), Box(shift + gap / 2, 11.0, -0.2, 0.2)]
     world = World(BOUNDS, walls)
@@ -82,19 +84,19 @@ def follow(world, start, goal, radius=0.3, steps=2800):
 MAZE = [Box(-10, 6, -6.2, -5.8), Box(-6, 10, -2.2, -1.8), Box(-10, 6, 1.8, 2.2), Wall((-6, 6), (10, 6))]
 
 
-@pytest.mark.parametrize("count", [3, 14], ids=["own searches", "a shared field"])
-def test_way_points_lead_to_the_goal_without_touching_walls(count, rng):
+@pytest.mark.parametrize(("count", "detour"), [(3, 1.05), (14, 1.1)], ids=["own searches", "a shared field"])
+def test_way_points_lead_to_the_goal_without_touching_walls(count, detour, rng):
     world = World(BOUNDS, MAZE)
     start = np.stack([rng.uniform(-9, 9, count), np.zeros(count), np.full(count, -8.0)], axis=1)
     goal = np.tile([8.0, 0.0, 9.0], (count, 1))
     track, _ = follow(world, start, goal)
     np.testing.assert_allclose(track[-1], goal, atol=0.06)
     for character in range(count):
-        assert world.clearance_at(track[:, character]).min() > 0.12
+        assert world.clearance_at(track[:, character]).min() > 0.24
         length = np.linalg.norm(np.diff(track[:, character], axis=0), axis=1).sum()
         best = oracle.shortest_way(world, start[character], goal[character], 0.3)
         # Those who share a goal spread over wide gaps, which makes some ways longer.
-        assert length < (1.05 if count < 10 else 1.2) * best + 0.6
+        assert length < detour * best + 0.6
 
 
 def test_a_way_that_is_closed_is_found_anew():
@@ -128,9 +130,8 @@ def test_unreachable_goals_leave_people_where_they_are():
 
 
 def test_a_large_world_is_built_quickly(rng):
-    import time
-
-    boxes = [Box(x, x + 1, z, z + 1) for x, z in rng.uniform(-95, 95, (300, 2))]
+    boxes = [Box(x, x + 1, z, z + 1) for x, z in rng.uniform(-95, 95, (700, 2))]
+    World(BOUNDS, boxes[:1]).grid(0.5)
     begin = time.perf_counter()
     World((-100, 100, -100, 100), boxes).grid(0.5)
-    assert time.perf_counter() - begin < 10.0
+    assert time.perf_counter() - begin < 2.0, "about 0.1 s on a free core"

@@ -1,7 +1,8 @@
-"""Slow twin of routing: the shortest way over the visibility graph of inflated obstacles."""
+"""Slow twins of routing: the shortest way over the visibility graph of inflated obstacles; way points."""
 
 import heapq
 
+import numpy as np
 import shapely
 
 
@@ -35,3 +36,30 @@ def shortest_way(world, start, goal, radius):
                 best[other] = new
                 heapq.heappush(queue, (new, other))
     return float("inf")
+
+
+def way_length(start, corners):
+    """Length of the way from a start over corners, m."""
+    points = np.vstack([start, corners])
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def next_corner(is_free, place, corners, index, reach):
+    """Farthest corner in sight, going on one by one; None when none of the next, this, the last is."""
+    last = len(corners) - 1
+    found = index
+    while found < last and is_free(place, corners[found + 1]):
+        found += 1
+    if found > index:
+        return found
+    if is_free(place, corners[index]):
+        is_passed = np.linalg.norm(corners[index] - place) < 0.25 * reach
+        return min(index + 1, last) if is_passed else index
+    if index > 0 and is_free(place, corners[index - 1]):
+        return index if np.linalg.norm(corners[index - 1] - place) < reach else index - 1
+    return None
+
+
+def touches(start, corners, low, high):
+    """A way over corners touches a rectangle."""
+    return shapely.LineString(np.vstack([start, corners])).intersects(shapely.box(*low, *high))
