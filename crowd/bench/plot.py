@@ -49,9 +49,8 @@ def draw(rows: Sequence[Mapping[str, Any]], machine: Mapping[str, Any], path: Pa
     )
     axes.axhline(60.0, color="0.6", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel="characters", ylabel="frames per second", ylim=(5, None))
-    axes.set_title(
-        f"{machine['processor']}, up to {max(row['threads'] for row in rows)} threads, {machine['date']}", fontsize=9
-    )
+    threads = max(row["threads"] for row in rows)
+    axes.set_title(f"{machine['processor']}, up to {threads} threads, {machine['date']}", fontsize=9)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     try:

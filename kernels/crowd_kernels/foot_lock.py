@@ -165,9 +165,7 @@ def plan_foot(
             yaw_offset_rate[character, leg] = (yaw - yaw_before) / dt
     if wanted == SWING:
         for axis in range(3):
-            value, rate = ease(
-                before[axis], offset_rate[character, leg, axis], 0.0, limits.swing_rate, dt
-            )
+            value, rate = ease(before[axis], offset_rate[character, leg, axis], 0.0, limits.swing_rate, dt)
             offset[character, leg, axis] = value
             offset_rate[character, leg, axis] = rate
         value, rate = ease(yaw_before, yaw_offset_rate[character, leg], 0.0, limits.swing_rate, dt)
