@@ -10,14 +10,14 @@ from crowd_kernels.cells import find_extent, mean_company, sort_into_cells
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 
-WANTED_COMPANY = 1.0
+WANTED_COMPANY = 3.0
 MOST_ADJUSTMENTS = 4
 
 
 class CellTable:
     """Scratch arrays of the counting sort, and the size of its cells.
 
-    The size follows the density: about one character per cell is fastest. Results of searches do not depend
+    The size follows the density: about three characters per cell are fastest. Results of searches do not depend
     on it, so it is no part of a saved state.
 
     Parameters

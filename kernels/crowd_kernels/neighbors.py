@@ -65,11 +65,9 @@ def insert_run(
     z: float,
     own: int,
     above: int,
-    limit_key: int,
-    found: int,
     wanted: int,
     keys: Any,
-) -> Any:
+) -> None:
     """Insert the characters of a run of slots into the sorted list of nearest ones.
 
     Parameters
@@ -86,38 +84,24 @@ def insert_run(
         Character that is left out.
     above : int
         Only characters with numbers above this are taken.
-    limit_key : int
-        Only keys below this are taken; it falls as the list fills.
-    found : int
-        Entries in the list so far.
     wanted : int
-        Length at which the list is full.
+        Length of the list.
     keys : (>= wanted,) int64
-        The list, ascending. In and out.
-
-    Returns
-    -------
-    tuple of int
-        Entries and limit after the run.
+        The list, ascending; only keys below its last one are taken. In and out.
     """
+    limit_key = keys[wanted - 1]
     for slot in range(begin, end):
         dx = point[2 * slot] - x
         dz = point[2 * slot + 1] - z
         key = neighbor_key(dx * dx + dz * dz, character[slot])
         if key >= limit_key or character[slot] == own or character[slot] <= above:
             continue
-        place = found
-        if found < wanted:
-            found += 1
-        else:
-            place -= 1
-        while place > 0 and keys[place - 1] > key:
-            keys[place] = keys[place - 1]
-            place -= 1
-        keys[place] = key
-        if found == wanted:
-            limit_key = keys[wanted - 1]
-    return found, limit_key
+        # A pass over the whole list without a branch beats a search for the place, which is mispredicted.
+        for place in range(wanted):
+            other = keys[place]
+            keys[place] = min(other, key)
+            key = max(other, key)
+        limit_key = keys[wanted - 1]
 
 
 @inlined_kernel
@@ -133,11 +117,9 @@ def insert_row(
     z: float,
     own: int,
     above: int,
-    limit_key: int,
-    found: int,
     wanted: int,
     keys: Any,
-) -> Any:
+) -> None:
     """Insert the characters of some cells side by side; the row of cells closes into a ring.
 
     Parameters
@@ -153,13 +135,8 @@ def insert_row(
         First column, -columns <= column < columns.
     count : int
         Number of cells, <= columns.
-    x, z, own, above, limit_key, found, wanted, keys
+    x, z, own, above, wanted, keys
         See `insert_run`.
-
-    Returns
-    -------
-    tuple of int
-        Entries and limit after the row.
     """
     if column < 0:
         column += columns
@@ -168,15 +145,10 @@ def insert_row(
         count -= rest
     begin = cell_start[first_cell + column]
     end = cell_start[first_cell + column + count]
-    found, limit_key = insert_run(
-        point, character, begin, end, x, z, own, above, limit_key, found, wanted, keys
-    )
+    insert_run(point, character, begin, end, x, z, own, above, wanted, keys)
     if rest > 0:
         begin, end = cell_start[first_cell], cell_start[first_cell + rest]
-        found, limit_key = insert_run(
-            point, character, begin, end, x, z, own, above, limit_key, found, wanted, keys
-        )
-    return found, limit_key
+        insert_run(point, character, begin, end, x, z, own, above, wanted, keys)
 
 
 @inlined_kernel
@@ -216,7 +188,7 @@ def find_nearest(
     wanted : int
         Largest number to find, >= 1.
     keys : (>= wanted,) int64
-        Written: `neighbor_key` of those found, ascending.
+        Written: `neighbor_key` of those found, ascending, then numbers without meaning.
 
     Returns
     -------
@@ -235,19 +207,19 @@ def find_nearest(
     column, row = own_column % columns, own_row % rows
     last_ring = min(math.ceil(reach / cell_size) + 1, (min(columns, rows) - 1) // 2)
     # With number 0, whoever is exactly at `reach` is out.
-    limit_key = neighbor_key(reach * reach, 0)
-    limit = math.inf
-    found = 0
+    reach_key = neighbor_key(reach * reach, 0)
+    for place in range(wanted):
+        keys[place] = reach_key
     # The own cell and the ring around it are taken in one go, as three rows.
     for ring in range(1, last_ring + 1):
-        if ring > 1:
-            limit = ROUNDED_UP * squared_distance_of(limit_key)
-            gap = (ring - 1) * cell_size + edge
-            if gap * gap > limit:
-                break
-        for step in range(-ring, ring + 1):
+        gap = (ring - 1) * cell_size + edge
+        if ring > 1 and gap * gap > ROUNDED_UP * squared_distance_of(keys[wanted - 1]):
+            break
+        for turn in range(2 * ring + 1):
+            # The nearest rows come first, so that the list soon refuses most of the others.
+            step = (turn + 1) // 2 if turn % 2 == 1 else -(turn // 2)
             gap = step * cell_size - inner_z if step > 0 else inner_z - (step + 1) * cell_size
-            if step != 0 and gap * gap > limit:
+            if step != 0 and gap * gap > ROUNDED_UP * squared_distance_of(keys[wanted - 1]):
                 continue
             line = row + step
             if line < 0:
@@ -256,16 +228,19 @@ def find_nearest(
                 line -= rows
             is_whole = ring == 1 or abs(step) == ring
             width = 2 * ring + 1 if is_whole else 1
-            found, limit_key = insert_row(
+            insert_row(
                 cell_start, point, character, columns, line * columns, column - ring, width,
-                x, z, own, above, limit_key, found, wanted, keys,
+                x, z, own, above, wanted, keys,
             )  # fmt: skip
             if not is_whole:
                 right = column + ring if column + ring < columns else column + ring - columns
-                found, limit_key = insert_row(
+                insert_row(
                     cell_start, point, character, columns, line * columns, right, 1,
-                    x, z, own, above, limit_key, found, wanted, keys,
+                    x, z, own, above, wanted, keys,
                 )  # fmt: skip
+    found = 0
+    while found < wanted and keys[found] < reach_key:
+        found += 1
     return found
 
 

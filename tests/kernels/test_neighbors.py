@@ -109,7 +109,7 @@ def test_the_cells_do_not_change_the_answer(rng, cell_size, table_size):
 
 
 def test_cells_follow_the_density(rng):
-    for density, low, high in ((0.05, 2.0, 5.0), (1.0, 0.7, 1.6), (6.0, 0.25, 0.7)):
+    for density, low, high in ((0.05, 3.5, 5.0), (1.0, 1.2, 2.6), (6.0, 0.4, 1.1)):
         size = np.sqrt(2000 / density) / 2
         cells = CellTable(2000, 0.25, 5.0)
         for _ in range(3):
