@@ -56,3 +56,38 @@ def continuous(rotation: FloatArray) -> FloatArray:
     result = rotation.copy()
     result[1:] *= sign[..., None]
     return result
+
+
+def slerp(first: FloatArray, second: FloatArray, share: npt.ArrayLike) -> FloatArray:
+    """Turn from rotations (..., 4) towards others by a share (...), the short way round."""
+    step = to_vector(multiply(conjugate(first), second))
+    return multiply(first, from_vector(step * np.asarray(share, np.float64)[..., None]))
+
+
+def to_vector(rotation: FloatArray) -> FloatArray:
+    """Rotation vectors (..., 3), rad, of unit quaternions (..., 4); at most half a turn."""
+    sign = np.where(rotation[..., :1] < 0.0, -1.0, 1.0)
+    axis, cosine = sign * rotation[..., 1:], np.abs(rotation[..., 0])
+    sine = np.linalg.norm(axis, axis=-1)
+    angle = 2.0 * np.arctan2(sine, cosine)
+    return np.asarray(axis * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)[..., None])
+
+
+def from_vector(vector: FloatArray) -> FloatArray:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3), rad."""
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(0.5 * angle), vector * 0.5 * np.sinc(angle / (2.0 * np.pi))], axis=-1)
+
+
+def swing(start: npt.ArrayLike, end: npt.ArrayLike) -> FloatArray:
+    """Smallest rotation (..., 4) that takes the direction of vectors (..., 3) to that of others."""
+    a, b = np.asarray(start, np.float64), np.asarray(end, np.float64)
+    a = a / np.linalg.norm(a, axis=-1, keepdims=True)
+    b = b / np.linalg.norm(b, axis=-1, keepdims=True)
+    cosine = (a * b).sum(axis=-1, keepdims=True)
+    axis = np.cross(a, b)
+    # Opposite directions: any axis across will do.
+    spare = np.cross(a, np.where(np.abs(a[..., :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    rotation = np.concatenate([1.0 + cosine, np.where(cosine < -1.0 + 1e-9, spare, axis)], axis=-1)
+    rotation[..., :1] = np.where(cosine < -1.0 + 1e-9, 0.0, rotation[..., :1])
+    return np.asarray(rotation / np.linalg.norm(rotation, axis=-1, keepdims=True))

@@ -1,0 +1,362 @@
+"""Retarget to the project's skeleton: rest poses matched, proportions bridged, feet on the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.motion.body import leg_lengths, sole_points
+from crowd.motion.importing.axes import PosedSource
+from crowd.motion.importing.joint_names import FINGERS, SIDES, JointMap
+from crowd.motion.rotation import about, conjugate, continuous, multiply, rotate, slerp, swing
+from crowd.motion.skeleton import Skeleton
+from crowd.motion.source import world_pose
+
+FloatArray = npt.NDArray[np.float64]
+
+LONGEST = 0.9985
+"""Share of its length to which a leg is stretched at most, so that knees do not lock."""
+TOE_DOWN = 0.06
+"""A toe that the source does not move bends to the ground while the ball is nearer than this, m."""
+MOST_TIP = np.radians(22.0)
+TIP_FADE = 0.12
+"""After a foot has left the ground, what it was tipped fades over this time, s."""
+LIMBS = {
+    "upper_arm": "forearm",
+    "forearm": "hand",
+    "hand": "middle_1",
+    "thigh": "shank",
+    "shank": "foot",
+}
+"""Joints whose segments are aimed like the source's in its rest pose, with the joint that they point to."""
+
+
+@dataclass(frozen=True)
+class Retargeted:
+    """A motion on the project's skeleton, in world space.
+
+    Attributes
+    ----------
+    rotation_local : (F, J, 4) float64
+        Against the parent; the pelvis against the world.
+    pelvis : (F, 3) float64
+        m; the ground is at y = 0.
+    travel : (F, 3) float64
+        The source's own pelvis joint, in our scale, m; speeds are measured on it.
+    frame_rate : float
+    scale : float
+        Our leg length over the source's; distances are multiplied by it.
+    """
+
+    rotation_local: FloatArray
+    pelvis: FloatArray
+    travel: FloatArray
+    frame_rate: float
+    scale: float
+
+
+def leg_scale(source: PosedSource, joints: JointMap) -> float:
+    """Leg length of the project's skeleton over that of the source."""
+    rest = source.rest_position
+    lengths = []
+    for side in SIDES:
+        hip, knee, ankle = (rest[joints.joint[f"{side}_{part}"]] for part in ("thigh", "shank", "foot"))
+        lengths.append(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
+    return float(sum(leg_lengths()) / np.mean(lengths))
+
+
+def retarget(
+    source: PosedSource, joints: JointMap, skeleton: Skeleton, is_down: npt.NDArray[np.bool_], ground: float
+) -> Retargeted:
+    """Put a motion onto the project's skeleton.
+
+    Parameters
+    ----------
+    source : PosedSource
+    joints : JointMap
+    skeleton : Skeleton
+        The project's; rest frames along the world's axes.
+    is_down : (F, 2) bool
+        The right and the left foot are on the ground.
+    ground : float
+        Height of the ground under the source, m.
+
+    Notes
+    -----
+    Rotations are carried over in world space against both rest poses; limb segments are first aimed like the
+    source's in its rest pose, so that a T-pose and hanging arms agree. Feet then stay where the source's are
+    (times the ratio of leg lengths), soles on the ground while down, and the legs bend to meet them.
+    """
+    scale = leg_scale(source, joints)
+    rotation = world_rotations(source, joints, skeleton)
+    level_feet(rotation, skeleton, is_down)
+    pelvis = place_pelvis(source, joints, skeleton, rotation, scale, ground)
+    ankles = place_ankles(source, joints, skeleton, rotation, scale, is_down, ground)
+    pelvis = within_reach(pelvis, rotation, skeleton, ankles)
+    for side, ankle in zip(("right", "left"), ankles, strict=True):
+        bend_leg(rotation, skeleton, side, pelvis, ankle)
+        if f"{side}_toe" not in joints.joint:
+            bend_toe(rotation, skeleton, side, ankle)
+    local = rotation.copy()
+    for joint, parent in enumerate(skeleton.parent):
+        if parent >= 0:
+            local[:, joint] = multiply(conjugate(rotation[:, parent]), rotation[:, joint])
+    travel = scale * source.position[:, joints.joint["pelvis"]]
+    return Retargeted(continuous(local), pelvis, travel, source.frame_rate, scale)
+
+
+def world_rotations(source: PosedSource, joints: JointMap, skeleton: Skeleton) -> FloatArray:
+    """World rotations (F, J, 4) of our joints; those without a source follow their parent."""
+    frames = len(source.position)
+    known: dict[int, FloatArray] = {}
+    pelvis = source.turned[:, joints.joint["pelvis"]]
+    known[0] = pelvis
+    spine = [pelvis] + [source.turned[:, joint] for joint in joints.chain["spine"]]
+    for number in range(1, 5):
+        known[skeleton.joint(f"spine_{number}")] = along_chain(spine, number / 4)
+    chest = spine[-1]
+    head = source.turned[:, joints.joint["head"]] if "head" in joints.joint else chest
+    neck = [chest] + [source.turned[:, joint] for joint in joints.chain["neck"]] + [head]
+    for number in (1, 2):
+        known[skeleton.joint(f"neck_{number}")] = along_chain(neck, number / 3)
+    known[skeleton.joint("head")] = head
+    for role, joint in joints.joint.items():
+        side, _, part = role.partition("_")
+        if side in SIDES and part != "toe_end":
+            known[skeleton.joint(role)] = multiply(
+                source.turned[:, joint], rest_aim(source, joints, skeleton, role)
+            )
+    rotation = np.zeros((frames, skeleton.joint_count, 4))
+    for joint, parent in enumerate(skeleton.parent):
+        rotation[:, joint] = known.get(joint, rotation[:, parent])
+    return rotation
+
+
+def along_chain(rotations: list[FloatArray], share: float) -> FloatArray:
+    """Rotation at a share of the way up a chain, between those of its joints."""
+    place = share * (len(rotations) - 1)
+    below = min(int(place), len(rotations) - 2) if len(rotations) > 1 else 0
+    if len(rotations) == 1:
+        return rotations[0]
+    return slerp(rotations[below], rotations[below + 1], place - below)
+
+
+def rest_aim(source: PosedSource, joints: JointMap, skeleton: Skeleton, role: str) -> FloatArray:
+    """Rotation that puts a segment of our rest pose along the source's, (4,)."""
+    side, _, part = role.partition("_")
+    still = np.array([1.0, 0.0, 0.0, 0.0])
+    rest = source.rest_position
+    if part in ("foot", "toe"):
+        ahead = next((joints.joint[r] for r in (f"{side}_toe", f"{side}_toe_end") if r in joints.joint), None)
+        if ahead is None:
+            return still
+        way = rest[ahead] - rest[joints.joint[f"{side}_foot"]]
+        return about(1, np.arctan2(way[0], way[2])) if np.hypot(way[0], way[2]) > 1e-6 else still
+    finger, _, number = part.rpartition("_")
+    child = LIMBS.get(part) or (f"{finger}_{int(number) + 1}" if finger in FINGERS else None)
+    if child is None:
+        return still
+    if f"{side}_{child}" not in joints.joint:
+        above = {"hand": "forearm", **{f"{f}_3": f"{f}_2" for f in FINGERS}}.get(part)
+        above = above or ("hand" if finger in FINGERS else None)
+        has_above = above is not None and f"{side}_{above}" in joints.joint
+        return rest_aim(source, joints, skeleton, f"{side}_{above}") if has_above else still
+    way = rest[joints.joint[f"{side}_{child}"]] - rest[joints.joint[role]]
+    ours = skeleton.offset[skeleton.joint(f"{side}_{child}")]
+    return swing(ours, way) if np.linalg.norm(way) > 1e-6 else still
+
+
+def level_feet(rotation: FloatArray, skeleton: Skeleton, is_down: npt.NDArray[np.bool_]) -> None:
+    """Turn each foot by a constant so that its sole is level on average in the middle of its stances."""
+    for column, side in enumerate(("right", "left")):
+        foot, toe = skeleton.joint(f"{side}_foot"), skeleton.joint(f"{side}_toe")
+        middle = middle_of_stances(is_down[:, column])
+        if not middle.any():
+            continue
+        # Up, in the frame of the foot: level when it is +y.
+        up = rotate(conjugate(rotation[middle, foot]), np.array([0.0, 1.0, 0.0])).mean(axis=0)
+        tilt = swing(np.array([0.0, 1.0, 0.0]), up)
+        rotation[:, foot] = multiply(rotation[:, foot], tilt)
+        rotation[:, toe] = multiply(rotation[:, toe], tilt)
+
+
+def middle_of_stances(is_down: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Frames in the middle third of the stances of a foot."""
+    result = np.zeros(len(is_down), bool)
+    for begin, end in runs(is_down):
+        third = (end - begin) // 3
+        result[begin + third : end - third] = True
+    return result
+
+
+def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one-past-last index of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(begin), int(end)) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def place_pelvis(
+    source: PosedSource,
+    joints: JointMap,
+    skeleton: Skeleton,
+    rotation: FloatArray,
+    scale: float,
+    ground: float,
+) -> FloatArray:
+    """Pelvis positions (F, 3) that keep the height of the hips over the ankles, in leg lengths."""
+    hips = 0.5 * sum(source.position[:, joints.joint[f"{side}_thigh"]] for side in SIDES)
+    ours = 0.5 * sum(skeleton.offset[skeleton.joint(f"{side}_thigh")] for side in SIDES)
+    target = scale * hips
+    target[:, 1] = scale * (hips[:, 1] - ground - sole_depth(source, joints)) - sole_points()[0][1]
+    return np.asarray(target - rotate(rotation[:, 0], ours))
+
+
+def sole_depth(source: PosedSource, joints: JointMap) -> float:
+    """Height of the source's ankles over the ground in its rest pose, m."""
+    rest = source.rest_position
+    feet = [joint for role, joint in joints.joint.items() if role.endswith(("foot", "toe", "toe_end"))]
+    lowest = rest[feet, 1].min()
+    ankle = np.mean([rest[joints.joint[f"{side}_foot"], 1] for side in SIDES])
+    return float(np.clip(ankle - lowest, 0.04, 0.14))
+
+
+def place_ankles(
+    source: PosedSource,
+    joints: JointMap,
+    skeleton: Skeleton,
+    rotation: FloatArray,
+    scale: float,
+    is_down: npt.NDArray[np.bool_],
+    ground: float,
+) -> FloatArray:
+    """Ankle positions (2, F, 3), right and left, with soles on the ground while down and never below it."""
+    depth = sole_depth(source, joints)
+    heel, ball = sole_points()
+    result = []
+    for column, side in enumerate(("right", "left")):
+        ankle = scale * source.position[:, joints.joint[f"{side}_foot"]]
+        ankle[:, 1] = scale * (ankle[:, 1] / scale - ground - depth) - heel[1]
+        press_ball(rotation, skeleton, side, ankle, is_down[:, column], source.frame_rate)
+        foot = rotation[:, skeleton.joint(f"{side}_foot")]
+        lowest = ankle[:, 1] + np.minimum(rotate(foot, heel)[:, 1], rotate(foot, ball)[:, 1])
+        result.append(ankle + np.outer(lift(lowest, is_down[:, column], source.frame_rate), (0.0, 1.0, 0.0)))
+    return np.array(result)
+
+
+def press_ball(
+    rotation: FloatArray,
+    skeleton: Skeleton,
+    side: str,
+    ankle: FloatArray,
+    is_down: npt.NDArray[np.bool_],
+    frame_rate: float,
+) -> None:
+    """Tip a foot that is down forward where neither heel nor ball reaches the ground.
+
+    A foot shorter than the source's would hang in the air as soon as the heel rises, or pull the body down.
+    """
+    heel, ball = sole_points()
+    foot = skeleton.joint(f"{side}_foot")
+    reach = np.zeros(len(ankle))
+    for _ in range(3):
+        tip = about(0, reach)
+        world = multiply(rotation[:, foot], tip)
+        to_ball = rotate(world, ball)
+        gap = ankle[:, 1] + np.minimum(rotate(world, heel)[:, 1], to_ball[:, 1])
+        lever = np.maximum(np.hypot(to_ball[:, 0], to_ball[:, 2]), 0.04)
+        reach = np.where(is_down, np.clip(reach + gap / lever, 0.0, MOST_TIP), 0.0)
+    frames = np.arange(len(ankle))
+    if not reach.any():
+        return
+    held = np.interp(frames, frames[is_down], reach[is_down])
+    away = np.abs(frames[:, None] - frames[is_down]).min(axis=1) / frame_rate
+    held *= np.clip(1.0 - away / TIP_FADE, 0.0, 1.0)
+    rotation[:, foot] = multiply(rotation[:, foot], about(0, smoothed(held, round(0.03 * frame_rate))))
+
+
+def lift(lowest: FloatArray, is_down: npt.NDArray[np.bool_], frame_rate: float) -> FloatArray:
+    """Heights (F,) to add so that a sole is at 0 while down, and above elsewhere; changes are spread."""
+    frames = np.arange(len(lowest))
+    if not is_down.any():
+        return np.maximum(-lowest, 0.0)
+    wanted = np.interp(frames, frames[is_down], -lowest[is_down])
+    return np.maximum(smoothed(wanted, round(0.03 * frame_rate)), -lowest)
+
+
+def smoothed(values: FloatArray, reach: int) -> FloatArray:
+    """Weighted mean over `reach` frames to each side."""
+    window = np.hanning(2 * reach + 3)[1:-1]
+    padded = np.pad(values, reach, mode="edge")
+    return np.convolve(padded, window / window.sum(), mode="valid")
+
+
+def within_reach(
+    pelvis: FloatArray, rotation: FloatArray, skeleton: Skeleton, ankles: FloatArray
+) -> FloatArray:
+    """Lower the pelvis smoothly where an ankle is farther away than the leg is long."""
+    longest = LONGEST * sum(leg_lengths())
+    missing = np.zeros(len(pelvis))
+    for side, ankle in zip(("right", "left"), ankles, strict=True):
+        hip = pelvis + rotate(rotation[:, 0], skeleton.offset[skeleton.joint(f"{side}_thigh")])
+        across = np.hypot(ankle[:, 0] - hip[:, 0], ankle[:, 2] - hip[:, 2])
+        highest = ankle[:, 1] + np.sqrt(np.maximum(longest**2 - across**2, 1e-4))
+        missing = np.maximum(missing, hip[:, 1] - highest)
+    if not missing.any():
+        return pelvis
+    reach = 3
+    widest = np.lib.stride_tricks.sliding_window_view(np.pad(missing, reach, mode="edge"), 2 * reach + 1).max(
+        axis=1
+    )
+    return pelvis - np.outer(np.maximum(smoothed(widest, reach), missing), (0.0, 1.0, 0.0))
+
+
+def bend_leg(
+    rotation: FloatArray, skeleton: Skeleton, side: str, pelvis: FloatArray, ankle: FloatArray
+) -> None:
+    """Turn thigh and shank so that the ankle is met; the knee keeps its plane and its twist."""
+    thigh, shank, foot = (skeleton.joint(f"{side}_{part}") for part in ("thigh", "shank", "foot"))
+    upper, lower = (np.linalg.norm(skeleton.offset[joint]) for joint in (shank, foot))
+    hip = pelvis + rotate(rotation[:, 0], skeleton.offset[thigh])
+    knee_way = rotate(rotation[:, thigh], skeleton.offset[shank])
+    way = ankle - hip
+    distance = np.linalg.norm(way, axis=1)
+    direction = way / np.maximum(distance, 1e-9)[:, None]
+    length = np.clip(distance, abs(upper - lower) + 1e-4, LONGEST * (upper + lower))
+    ahead = rotate(rotation[:, thigh], np.array([0.0, 0.0, 1.0]))
+    # A nearly straight leg has no plane of its own: the thigh's front decides.
+    bend = knee_way - direction * (knee_way * direction).sum(1)[:, None] + 0.02 * ahead
+    bend -= direction * (bend * direction).sum(1)[:, None]
+    bend /= np.maximum(np.linalg.norm(bend, axis=1), 1e-9)[:, None]
+    along = (upper**2 - lower**2 + length**2) / (2.0 * length)
+    out = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
+    new_knee = along[:, None] * direction + out[:, None] * bend
+    new_shank = length[:, None] * direction - new_knee
+    rotation[:, shank] = multiply(
+        swing(rotate(rotation[:, shank], skeleton.offset[foot]), new_shank), rotation[:, shank]
+    )
+    rotation[:, thigh] = multiply(swing(knee_way, new_knee), rotation[:, thigh])
+
+
+def bend_toe(rotation: FloatArray, skeleton: Skeleton, side: str, ankle: FloatArray) -> None:
+    """Bend a toe that the source does not have, so that it stays on the ground while the heel rises."""
+    foot, toe = skeleton.joint(f"{side}_foot"), skeleton.joint(f"{side}_toe")
+    ball = ankle + rotate(rotation[:, foot], sole_points()[1])
+    ahead = rotate(rotation[:, foot], np.array([0.0, 0.0, 1.0]))
+    pitch = np.arcsin(np.clip(-ahead[:, 1], 0.0, np.sin(1.0)))
+    share = np.clip(1.0 - ball[:, 1] / TOE_DOWN, 0.0, 1.0)
+    rotation[:, toe] = multiply(rotation[:, foot], about(0, -pitch * share * share * (3.0 - 2.0 * share)))
+
+
+def foot_points(motion: Retargeted, skeleton: Skeleton) -> FloatArray:
+    """Heel and ball of the soles in world space, (F, 2, 2, 3): right and left foot, heel and ball."""
+    offset = np.broadcast_to(skeleton.offset, (*motion.rotation_local.shape[:2], 3)).copy()
+    offset[:, 0] = motion.pelvis
+    rotation, position = world_pose(skeleton.parent, motion.rotation_local, offset)
+    result = np.zeros((len(offset), 2, 2, 3))
+    for column, side in enumerate(("right", "left")):
+        foot = skeleton.joint(f"{side}_foot")
+        for row, point in enumerate(sole_points()):
+            result[:, column, row] = position[:, foot] + rotate(rotation[:, foot], point)
+    return result
