@@ -33,7 +33,13 @@ class ClipKind(StrEnum):
     IDLE = "idle"
     START = "start"
     STOP = "stop"
+    STEP = "step"
+    TURN = "turn"
+    JUMP = "jump"
+    REACH = "reach"
     GESTURE = "gesture"
+    HAND_POSE = "hand_pose"
+    OTHER = "other"
 
 
 class JointMask(StrEnum):
@@ -45,6 +51,71 @@ class JointMask(StrEnum):
     RIGHT_ARM = "right_arm"
     LEFT_ARM = "left_arm"
     HEAD = "head"
+
+
+@dataclass(frozen=True)
+class JumpLabels:
+    """What a jump clip does.
+
+    Attributes
+    ----------
+    take_off, apex, landing : float
+        Times, s: the last foot leaves, the pelvis is highest, the first foot lands.
+    length : float
+        Way of the pelvis over the ground in the whole clip, m.
+    flight_length : float
+        Way while both feet are off the ground, m.
+    rise : float
+        Highest pelvis over its height at the start, m.
+    direction : float
+        Of the jump against the facing at the start, rad, left positive; 0 on the spot.
+    """
+
+    take_off: float
+    apex: float
+    landing: float
+    length: float
+    flight_length: float
+    rise: float
+    direction: float
+
+
+@dataclass(frozen=True)
+class ReachLabels:
+    """What a reach clip does.
+
+    Attributes
+    ----------
+    side : str
+        ``"left"`` or ``"right"`` hand.
+    apex : float
+        Time at which the hand is where it reaches to, s.
+    hand_position : tuple of float
+        Wrist at the apex in the root frame at the start (left, up, ahead), m.
+    """
+
+    side: str
+    apex: float
+    hand_position: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ClipQuality:
+    """How good the motion of an imported clip is, before anything at run time mends it.
+
+    Attributes
+    ----------
+    stance_drift : float
+        Mean way that a planted foot drifts in a stance, m.
+    seam : float
+        Mean joint angle between the ends of a loop before it was closed, rad; 0 for others.
+    flight_gravity : float
+        Downward acceleration of the pelvis in flight, m/s^2; 0 where there is no flight.
+    """
+
+    stance_drift: float = 0.0
+    seam: float = 0.0
+    flight_gravity: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -82,6 +153,12 @@ class Clip:
         Gait cycles in the clip: 2 for locomotion, 0 elsewhere.
     mask : JointMask
         For gestures: joints that the clip writes.
+    jump : JumpLabels or None
+    reach : ReachLabels or None
+    quality : ClipQuality or None
+        Of imported clips.
+    source : str
+        File that it was imported from; empty for clips that the engine made.
     """
 
     name: str
@@ -96,6 +173,10 @@ class Clip:
     parameters: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cycles: int = 0
     mask: JointMask = field(default=JointMask.FULL_BODY)
+    jump: JumpLabels | None = None
+    reach: ReachLabels | None = None
+    quality: ClipQuality | None = None
+    source: str = ""
 
     @property
     def frame_count(self) -> int:

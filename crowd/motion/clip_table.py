@@ -28,7 +28,7 @@ HEAD_PARTS = ("neck_1", "neck_2", "head", "left_eye", "right_eye")
 
 @dataclass(frozen=True)
 class ClipTable:
-    """Key frames of all clips of a library.
+    """Key frames of all clips of a library, single poses left out.
 
     Attributes
     ----------
@@ -83,23 +83,24 @@ class ClipTable:
         MotionError
             A locomotion clip is not cyclic over two cycles, or lacks foot strikes.
         """
-        sampled = [sample_keys(clip) for clip in library.clips]
+        clips = [clip for clip in library.clips if clip.frame_count > 1]
+        sampled = [sample_keys(clip) for clip in clips]
         count = np.array([len(rotation) for rotation, _ in sampled], np.int32)
-        examples = [number for number, clip in enumerate(library.clips) if clip.kind is ClipKind.LOCOMOTION]
+        examples = [number for number, clip in enumerate(clips) if clip.kind is ClipKind.LOCOMOTION]
         joint_mask, pelvis_mask = masks(library.skeleton)
         return cls(
-            tuple(clip.name for clip in library.clips),
+            tuple(clip.name for clip in clips),
             rows(np.concatenate([rotation for rotation, _ in sampled])),
             np.ascontiguousarray(np.concatenate([pelvis for _, pelvis in sampled]), np.float32),
             np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32),
             count,
-            np.array([key_rate(clip) for clip in library.clips]),
-            np.array([clip.is_cyclic for clip in library.clips]),
-            np.array([list(JointMask).index(clip.mask) for clip in library.clips], np.int32),
+            np.array([key_rate(clip) for clip in clips]),
+            np.array([clip.is_cyclic for clip in clips]),
+            np.array([list(JointMask).index(clip.mask) for clip in clips], np.int32),
             np.array(examples, np.int32),
-            np.array([library.clips[number].parameters for number in examples]),
-            np.array([library.clips[number].cycle_duration for number in examples]),
-            np.array([contact_phases(library.clips[number]) for number in examples]),
+            np.array([clips[number].parameters for number in examples]),
+            np.array([clips[number].cycle_duration for number in examples]),
+            np.array([contact_phases(clips[number]) for number in examples]),
             joint_mask,
             pelvis_mask,
         )

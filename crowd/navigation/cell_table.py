@@ -17,8 +17,8 @@ MOST_ADJUSTMENTS = 4
 class CellTable:
     """Scratch arrays of the counting sort, and the size of its cells.
 
-    The size follows the density: about three characters per cell are fastest. Results of searches do not depend
-    on it, so it is no part of a saved state.
+    The size follows the density: about three characters per cell are fastest. Results of searches do not
+    depend on it, so it is no part of a saved state.
 
     Parameters
     ----------

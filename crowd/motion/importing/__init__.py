@@ -1,1 +1,1 @@
-"""From a file's motion to a clip of ours: names, units and axes, retargeting, labels, cycles, example sets."""
+"""From a file's motion to clips of ours: names, axes, retargeting, labels, cycles, example sets."""

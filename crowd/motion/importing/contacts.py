@@ -1,4 +1,4 @@
-"""Which foot is down when: contacts of heel, ball and toe of a source motion, and the foot events they make."""
+"""Which foot is down when: contacts of heel, ball and toe of a source motion, and its foot events."""
 
 from __future__ import annotations
 
@@ -197,8 +197,9 @@ def find_stances(contacts: Contacts, rate: float) -> list[Stance]:
     """
     found = []
     for foot in range(2):
+        fore_foot = np.asarray(contacts.is_down[:, foot, BALL:].any(axis=1))
         for begin, end in intervals(contacts.foot_is_down[:, foot], rate, contacts.is_loop):
-            front = within(contacts.is_down[:, foot, BALL:].any(axis=1), begin, end, rate, contacts.is_loop)
+            front = within(fore_foot, begin, end, rate, contacts.is_loop)
             heel = within(contacts.is_down[:, foot, HEEL], begin, end, rate, contacts.is_loop)
             flat = front[0] if front else begin
             found.append(Stance(foot, begin, flat, max(heel[1], flat) if heel else flat, end))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,7 @@ from crowd.motion.source import world_pose
 FloatArray = npt.NDArray[np.float64]
 
 SEAM_MEAN, SEAM_MAX, SEAM_HEIGHT = math.radians(12.0), math.radians(36.0), 0.04
-"""A motion whose first and last pose differ by less is a loop: mean and largest joint angle, rad; height, m."""
+"""First and last pose of a loop differ by less: mean and largest joint angle, rad; height, m."""
 STRAIGHT_TURN = math.radians(8.0)
 """Less turn in a gait cycle is none."""
 ALONG_AXIS, ACROSS_AXIS = math.radians(35.0), math.radians(45.0)
@@ -118,7 +119,7 @@ def is_loop(motion: Retargeted, skeleton: Skeleton) -> bool:
 def alternate(stances: list[Stance]) -> bool:
     """Whether feet strike in turn, the same number of times."""
     feet = [stance.foot for stance in stances]
-    return len(feet) >= 2 and len(feet) % 2 == 0 and all(a != b for a, b in zip(feet, feet[1:], strict=False))
+    return len(feet) >= 2 and len(feet) % 2 == 0 and all(a != b for a, b in pairwise(feet))
 
 
 def find_window(motion: Retargeted, skeleton: Skeleton, stances: list[Stance], loops: bool) -> Window | None:
@@ -265,7 +266,7 @@ def cyclic_clip(name: str, motion: Retargeted, skeleton: Skeleton, window: Windo
     pelvis = rotate(back, pelvis - root.position)
     rotation, pelvis = close_seam(rotation, pelvis, skeleton)
     shift = (window.first_strike - window.begin) / duration * intervals
-    turned = (np.arange(intervals + 1) + shift) % intervals
+    turned = np.mod(np.arange(intervals + 1) + shift, intervals).astype(np.float64)
     rotation, pelvis = sample(rotation, turned), sample_linear(pelvis, turned)
     repeats = 2 // window.cycles
     rotation = np.concatenate([rotation[:-1]] * repeats + [rotation[:1]])

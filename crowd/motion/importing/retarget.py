@@ -206,8 +206,8 @@ def place_pelvis(
     ground: float,
 ) -> FloatArray:
     """Pelvis positions (F, 3) that keep the height of the hips over the ankles, in leg lengths."""
-    hips = 0.5 * sum(source.position[:, joints.joint[f"{side}_thigh"]] for side in SIDES)
-    ours = 0.5 * sum(skeleton.offset[skeleton.joint(f"{side}_thigh")] for side in SIDES)
+    hips = np.mean([source.position[:, joints.joint[f"{side}_thigh"]] for side in SIDES], axis=0)
+    ours = np.mean([skeleton.offset[skeleton.joint(f"{side}_thigh")] for side in SIDES], axis=0)
     target = scale * hips
     target[:, 1] = scale * (hips[:, 1] - ground - sole_depth(source, joints)) - sole_points()[0][1]
     return np.asarray(target - rotate(rotation[:, 0], ours))

@@ -1,0 +1,167 @@
+"""Clips that are not gait cycles, mirrored clips, and how good a clip is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.motion.body import sole_points
+from crowd.motion.clip import Clip, ClipKind, FootEvent, JointMask
+from crowd.motion.importing.contacts import Stance
+from crowd.motion.importing.cycles import close_seam, heading_of, posed, sample, sample_linear
+from crowd.motion.importing.retarget import Retargeted, smoothed
+from crowd.motion.rotation import about, continuous, multiply, rotate
+from crowd.motion.skeleton import Skeleton
+
+FloatArray = npt.NDArray[np.float64]
+
+ROOT_SMOOTHING = 0.25
+"""A root that follows the pelvis is averaged over this to each side, s."""
+IN_PLACE = (ClipKind.IDLE, ClipKind.GESTURE, ClipKind.REACH, ClipKind.HAND_POSE)
+
+
+def plain_clip(
+    name: str,
+    kind: ClipKind,
+    motion: Retargeted,
+    skeleton: Skeleton,
+    stances: list[Stance],
+    stands_first: bool,
+) -> Clip:
+    """Make a clip that is played once, or an idle that repeats.
+
+    The root of clips in place stands below the pelvis, faces as the feet do and does not move; that of
+    others follows the pelvis, averaged, and faces as the feet do where somebody stands first.
+    """
+    yaw = facing_of_feet(motion, skeleton)
+    if kind in IN_PLACE:
+        path = np.repeat(
+            motion.pelvis[:1] if kind is not ClipKind.IDLE else motion.pelvis.mean(0)[None], 1, 0
+        )
+        root = np.repeat(path * (1.0, 0.0, 1.0), len(yaw), axis=0)
+        heading = np.full(len(yaw), mean_angle(yaw) if kind is ClipKind.IDLE else yaw[0])
+    else:
+        reach = min(max(round(ROOT_SMOOTHING * motion.frame_rate), 1), max(len(yaw) // 3, 1))
+        unwrapped = np.unwrap(heading_of(motion.rotation_local[:, 0]))
+        if stands_first:
+            unwrapped += mean_angle(yaw[:1] - unwrapped[:1])
+        heading = smoothed(unwrapped, reach)
+        root = np.stack([smoothed(motion.pelvis[:, axis], reach) for axis in range(3)], axis=1)
+        root[:, 1] = 0.0
+    back = about(1, -heading)
+    rotation = motion.rotation_local.copy()
+    rotation[:, 0] = multiply(back, rotation[:, 0])
+    pelvis = rotate(back, motion.pelvis - root)
+    if kind is ClipKind.IDLE and len(rotation) > 2:
+        rotation, pelvis = close_seam(rotation, pelvis, skeleton)
+    start = about(1, -heading[:1])
+    events = tuple(sorted(event for stance in stances for event in stance.events))
+    return Clip(
+        name,
+        kind,
+        motion.frame_rate,
+        continuous(rotation).astype(np.float32),
+        pelvis.astype(np.float32),
+        rotate(start, root - root[:1]),
+        heading - heading[0],
+        is_cyclic=kind is ClipKind.IDLE,
+        foot_events=() if kind in IN_PLACE else events,
+    )
+
+
+def facing_of_feet(motion: Retargeted, skeleton: Skeleton) -> FloatArray:
+    """Mean heading of both feet, rad, (F,)."""
+    rotation, _ = posed(motion.rotation_local, motion.pelvis, skeleton)
+    feet = [heading_of(rotation[:, skeleton.joint(f"{side}_foot")]) for side in ("left", "right")]
+    return np.asarray(np.angle(np.exp(1j * feet[0]) + np.exp(1j * feet[1])))
+
+
+def mean_angle(angles: FloatArray) -> float:
+    """Circular mean, rad."""
+    return float(np.angle(np.exp(1j * angles).mean()))
+
+
+def mirrored(clip: Clip, skeleton: Skeleton, name: str) -> Clip:
+    """Make the mirror image of a clip, left for right.
+
+    A cyclic clip is shifted so that it starts with a right heel strike again.
+    """
+    other = [skeleton.joint(opposite(joint)) for joint in skeleton.joint_names]
+    rotation = clip.rotation_local[:, other] * np.array([1.0, 1.0, -1.0, -1.0], np.float32)
+    flip = np.array([-1.0, 1.0, 1.0])
+    pelvis = (clip.pelvis_position_root * flip).astype(np.float32)
+    swap = {event: FootEvent((event + 4) % 8) for event in FootEvent}
+    events = [(time, swap[event]) for time, event in clip.foot_events]
+    forward, turn, side = clip.parameters
+    masks = {JointMask.LEFT_ARM: JointMask.RIGHT_ARM, JointMask.RIGHT_ARM: JointMask.LEFT_ARM}
+    reach = clip.reach
+    if reach is not None:
+        left, up, ahead = reach.hand_position
+        reach = replace(
+            reach, side="left" if reach.side == "right" else "right", hand_position=(-left, up, ahead)
+        )
+    image = replace(
+        clip,
+        name=name,
+        rotation_local=rotation,
+        pelvis_position_root=pelvis,
+        root_position=clip.root_position * flip,
+        root_yaw=-clip.root_yaw,
+        foot_events=tuple(events),
+        parameters=(forward, -turn, -side),
+        mask=masks.get(clip.mask, clip.mask),
+        jump=None if clip.jump is None else replace(clip.jump, direction=-clip.jump.direction),
+        reach=reach,
+    )
+    return started_at_right_strike(image) if clip.cycles else image
+
+
+def opposite(joint: str) -> str:
+    """Name of the joint on the other side."""
+    if joint.startswith("left_"):
+        return "right_" + joint.removeprefix("left_")
+    return "left_" + joint.removeprefix("right_") if joint.startswith("right_") else joint
+
+
+def started_at_right_strike(clip: Clip) -> Clip:
+    """Shift a cyclic clip in time so that its first right heel strike comes at 0."""
+    shift = min(time for time, event in clip.foot_events if event is FootEvent.RHS)
+    intervals = clip.frame_count - 1
+    place = np.mod(np.arange(intervals + 1) + shift * clip.frame_rate, intervals)
+    events = [((time - shift) % clip.duration, event) for time, event in clip.foot_events]
+    events = [(0.0 if clip.duration - time < 1e-9 else time, event) for time, event in events]
+    return replace(
+        clip,
+        rotation_local=continuous(sample(clip.rotation_local.astype(np.float64), place)).astype(np.float32),
+        pelvis_position_root=sample_linear(clip.pelvis_position_root.astype(np.float64), place).astype(
+            np.float32
+        ),
+        foot_events=tuple(sorted(events, key=lambda entry: (round(entry[0], 9), int(entry[1])))),
+    )
+
+
+def stance_drift(clip: Clip, skeleton: Skeleton) -> float:
+    """Mean way, m, that heel or ball of a planted foot drifts over the ground in a stance.
+
+    The heel counts until the foot is flat, the ball from then on.
+    """
+    rotation, position = posed(
+        clip.rotation_local.astype(np.float64), clip.pelvis_position_root.astype(np.float64), skeleton
+    )
+    turn = about(1, clip.root_yaw)
+    drifts = []
+    for foot, side in enumerate(("right", "left")):
+        joint = skeleton.joint(f"{side}_foot")
+        kinds = list(FootEvent)[4 * foot : 4 * foot + 4]
+        times = {kind: [time for time, event in clip.foot_events if event is kind] for kind in kinds}
+        ball = position[:, joint] + rotate(rotation[:, joint], sole_points()[1])
+        world = clip.root_position + rotate(turn, ball)
+        for flat in times[kinds[1]]:
+            rises = next((time for time in sorted(times[kinds[2]]) if time >= flat), None)
+            if rises is None or rises - flat < 2.0 / clip.frame_rate:
+                continue
+            first, last = round(flat * clip.frame_rate), min(round(rises * clip.frame_rate), len(world) - 1)
+            drifts.append(float(np.hypot(*(world[last] - world[first])[[0, 2]])))
+    return float(np.mean(drifts)) if drifts else 0.0

@@ -1,0 +1,304 @@
+"""Import one motion: from what a file holds to a labelled clip on the project's skeleton."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.errors import MotionError, describe
+from crowd.motion.clip import Clip, ClipKind, ClipQuality, FootEvent, JointMask
+from crowd.motion.importing.axes import PosedSource, convert, find_convention
+from crowd.motion.importing.classify import jump_labels, kind_of, look_at, reach_labels
+from crowd.motion.importing.clips import facing_of_feet, plain_clip, stance_drift
+from crowd.motion.importing.contacts import Contacts, Stance, find_contacts, find_stances
+from crowd.motion.importing.cycles import cyclic_clip, find_window, heading_of, is_loop, sample, sample_linear
+from crowd.motion.importing.joint_names import JointMap, map_joints, read_mapping
+from crowd.motion.importing.labels import Correction
+from crowd.motion.importing.retarget import Retargeted, retarget
+from crowd.motion.rotation import conjugate, continuous, multiply, slerp, to_vector
+from crowd.motion.skeleton import Skeleton
+from crowd.motion.source import SourceMotion
+
+FloatArray = npt.NDArray[np.float64]
+
+HIGHEST_RATE = 60.0
+"""Faster captures are sampled down to this, Hz."""
+POP_ANGLE = math.radians(35.0)
+POP_RATIO = 4.0
+"""A frame pops when a joint goes this far there and back, and its neighbours agree that much better."""
+FOOT_TAGS = {
+    "heelstrikert": (0, "strike"),
+    "heelstrikelf": (1, "strike"),
+    "toeliftrt": (0, "leaves"),
+    "toeliftlf": (1, "leaves"),
+}
+FLAT_SHARE, RISES_SHARE = 0.15, 0.6
+"""Where only strike and lift are tagged, a foot is flat and its heel rises at these shares of the stance."""
+
+
+@dataclass(frozen=True)
+class ImportSettings:
+    """How files are read.
+
+    Attributes
+    ----------
+    units, up : str or None
+        Instead of what is found, see `find_convention`.
+    mapping : Path or None
+        File that says which joint is which.
+    """
+
+    units: str | None = None
+    up: str | None = None
+    mapping: Path | None = None
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A clip with what was found out about its source.
+
+    Attributes
+    ----------
+    clip : Clip
+        On the project's skeleton and in its scale.
+    family, convention : str
+        Naming family; units and axes in words.
+    scale : float
+        Our leg length over the source's.
+    unused_joints : tuple of str
+        Source joints that have no counterpart.
+    popped : int
+        Frames that were mended.
+    """
+
+    clip: Clip
+    family: str
+    convention: str
+    scale: float
+    unused_joints: tuple[str, ...]
+    popped: int
+
+
+def import_clip(
+    motion: SourceMotion,
+    skeleton: Skeleton,
+    settings: ImportSettings | None = None,
+    correction: Correction | None = None,
+) -> Imported:
+    """Retarget a motion, find its labels and make a clip.
+
+    Parameters
+    ----------
+    motion : SourceMotion
+    skeleton : Skeleton
+        The project's.
+    settings : ImportSettings, optional
+    correction : Correction, optional
+        What the user says instead of what would be found.
+
+    Raises
+    ------
+    MotionError
+        Joints cannot be mapped, units cannot be told, or a correction does not fit.
+    """
+    settings, told = settings or ImportSettings(), correction or Correction()
+    names = motion.skeleton.joint_names
+    joints = (
+        map_joints(names, str(motion.path))
+        if settings.mapping is None
+        else read_mapping(settings.mapping, names)
+    )
+    convention = find_convention(motion, joints, settings.units, settings.up)
+    source = cut(resampled(convert(motion, convention)), told, motion)
+    contacts = find_contacts(source, joints, is_loop=False)
+    moved, popped = without_pops(retarget(source, joints, skeleton, contacts.foot_is_down, contacts.ground))
+    loops = is_loop(moved, skeleton) if told.cyclic is None else told.cyclic
+    if loops:
+        contacts = find_contacts(source, joints, is_loop=True)
+    stances = told_stances(motion, told, source) or find_stances(contacts, source.frame_rate)
+    tags = dict(motion.tags)
+    clip = make_clip(motion.name, moved, contacts, stances, skeleton, told, tags, loops)
+    clip = corrected(clip, told, moved.scale, motion)
+    drift = stance_drift(clip, skeleton) if clip.foot_events else 0.0
+    quality = replace(clip.quality or ClipQuality(), stance_drift=drift)
+    clip = replace(clip, quality=quality, source=motion.path.name)
+    return Imported(clip, joints.family, convention.text, moved.scale, joints.unused, popped)
+
+
+def make_clip(
+    name: str,
+    motion: Retargeted,
+    contacts: Contacts,
+    stances: list[Stance],
+    skeleton: Skeleton,
+    told: Correction,
+    tags: Mapping[str, float],
+    loops: bool,
+) -> Clip:
+    """Decide what a motion serves, and make that clip with its labels."""
+    motions = look_at(motion, contacts, skeleton)
+    is_gait = not (motions.stands_first or motions.stands_last)
+    wants_gait = told.kind is ClipKind.LOCOMOTION
+    window = find_window(motion, skeleton, stances, loops) if is_gait or wants_gait else None
+    kind = told.kind or kind_of(name, motions, window)
+    if kind is ClipKind.LOCOMOTION:
+        if window is None:
+            raise MotionError(
+                describe(
+                    f'clip "{name}"',
+                    "holds no gait cycle that closes",
+                    f"{len(stances)} stances",
+                    "alternating strikes; correct begin, end or events in the file of labels",
+                )
+            )
+        clip = cyclic_clip(name, motion, skeleton, window)
+        return replace(clip, quality=ClipQuality(seam=window.seam))
+    clip = plain_clip(name, kind, motion, skeleton, stances, motions.stands_first)
+    headings = heading_of(motion.rotation_local[:1, 0])
+    yaw = float((facing_of_feet(motion, skeleton) if motions.stands_first else headings)[0])
+    if kind is ClipKind.GESTURE:
+        clip = replace(clip, mask=JointMask.UPPER_BODY)
+    if kind is ClipKind.JUMP:
+        jump = jump_labels(motion, motions, dict(tags), yaw)
+        clip = replace(clip, jump=jump, quality=ClipQuality(flight_gravity=motions.flight_gravity))
+    if kind is ClipKind.REACH:
+        clip = replace(clip, reach=reach_labels(motion, motions, skeleton, dict(tags), yaw))
+    return clip
+
+
+def resampled(source: PosedSource) -> PosedSource:
+    """Sample a fast capture down to `HIGHEST_RATE`."""
+    if source.frame_rate <= HIGHEST_RATE:
+        return source
+    frames = len(source.position)
+    place = np.arange(0.0, frames - 1 + 1e-9, source.frame_rate / HIGHEST_RATE)
+    flat = source.position.reshape(frames, -1)
+    position = sample_linear(flat, place).reshape(len(place), -1, 3)
+    return replace(source, position=position, turned=sample(source.turned, place), frame_rate=HIGHEST_RATE)
+
+
+def cut(source: PosedSource, told: Correction, motion: SourceMotion) -> PosedSource:
+    """Keep what lies between the told times.
+
+    Raises
+    ------
+    MotionError
+        Nothing is left.
+    """
+    if told.begin is None and told.end is None:
+        return source
+    first = round((told.begin or 0.0) * source.frame_rate)
+    last = len(source.position) if told.end is None else round(told.end * source.frame_rate) + 1
+    if last - first < 2 or first >= len(source.position):
+        raise MotionError(
+            describe(
+                f'labels of "{motion.name}"',
+                "begin and end leave nothing",
+                f"{told.begin} to {told.end} s",
+                f"within 0 to {motion.duration:.3f} s",
+            )
+        )
+    return replace(source, position=source.position[first:last], turned=source.turned[first:last])
+
+
+def without_pops(motion: Retargeted) -> tuple[Retargeted, int]:
+    """Mend single frames in which a joint jumps there and back.
+
+    Returns
+    -------
+    Retargeted, int
+        The motion and the number of frames mended.
+    """
+    local = motion.rotation_local
+    if len(local) < 3:
+        return motion, 0
+
+    def angle(first: FloatArray, second: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(to_vector(multiply(conjugate(first), second)), axis=-1))
+
+    there, back = angle(local[:-2], local[1:-1]), angle(local[1:-1], local[2:])
+    across = angle(local[:-2], local[2:])
+    pops = (np.minimum(there, back) > POP_ANGLE) & (np.minimum(there, back) > POP_RATIO * across)
+    if not pops.any():
+        return motion, 0
+    mended = local.copy()
+    frame, joint = np.nonzero(pops)
+    mended[frame + 1, joint] = slerp(local[frame, joint], local[frame + 2, joint], 0.5)
+    return replace(motion, rotation_local=continuous(mended)), len(np.unique(frame))
+
+
+def told_stances(motion: SourceMotion, told: Correction, source: PosedSource) -> list[Stance]:
+    """Stances by the file of labels, or by the tags of the source; none if neither tells any."""
+    duration = (len(source.position) - 1) / source.frame_rate
+    times: dict[tuple[int, str], list[float]] = {}
+    if told.events is not None:
+        parts = {"HS": "strike", "TS": "flat", "HO": "rises", "TO": "leaves"}
+        for time, name in told.events:
+            times.setdefault(("RL".index(name[0]), parts[name[1:]]), []).append(time)
+    else:
+        offset = told.begin or 0.0
+        for tag, time in motion.tags:
+            key = FOOT_TAGS.get(tag.lower().rstrip("0123456789"))
+            if key is not None and 0.0 <= time - offset <= duration:
+                times.setdefault(key, []).append(time - offset)
+    found = []
+    for foot in range(2):
+        strikes = sorted(times.get((foot, "strike"), []))
+        leaves = sorted(times.get((foot, "leaves"), []))
+        if leaves and (not strikes or leaves[0] < strikes[0]):
+            strikes.insert(0, 0.0)
+        for number, strike in enumerate(strikes):
+            following = strikes[number + 1] if number + 1 < len(strikes) else math.inf
+            off = next((time for time in leaves if strike < time < following), duration)
+            length = off - strike
+            flat = _between(times.get((foot, "flat"), []), strike, off, strike + FLAT_SHARE * length)
+            rises = _between(times.get((foot, "rises"), []), flat, off, strike + RISES_SHARE * length)
+            if length > 0.0:
+                found.append(Stance(foot, strike, flat, max(rises, flat), off))
+    return sorted(found, key=lambda stance: (stance.strike, stance.foot))
+
+
+def _between(times: list[float], low: float, high: float, otherwise: float) -> float:
+    return next((time for time in sorted(times) if low <= time <= high), otherwise)
+
+
+def corrected(clip: Clip, told: Correction, scale: float, motion: SourceMotion) -> Clip:
+    """Put what the user tells into a clip.
+
+    Raises
+    ------
+    MotionError
+        A correction is for another kind of clip.
+    """
+    where = f'labels of "{motion.name}"'
+    if any(value is not None for value in (told.forward, told.turn, told.side)):
+        if clip.kind is not ClipKind.LOCOMOTION:
+            raise MotionError(describe(where, "speeds are for locomotion", clip.kind.value))
+        forward, turn, side = clip.parameters
+        clip = replace(
+            clip,
+            parameters=(
+                forward if told.forward is None else told.forward * scale,
+                turn if told.turn is None else math.radians(told.turn),
+                side if told.side is None else told.side * scale,
+            ),
+        )
+    if told.jump is not None:
+        if clip.jump is None:
+            raise MotionError(describe(where, "there is no jump in it", clip.kind.value))
+        changed = {key: value for key, value in told.jump.model_dump().items() if value is not None}
+        clip = replace(clip, jump=replace(clip.jump, **changed))
+    return clip
+
+
+def strikes_of(clip: Clip) -> tuple[float, ...]:
+    """Times of the heel strikes of a clip, s."""
+    return tuple(time for time, event in clip.foot_events if event in (FootEvent.RHS, FootEvent.LHS))
+
+
+__all__ = ["ImportSettings", "Imported", "JointMap", "import_clip", "strikes_of"]
