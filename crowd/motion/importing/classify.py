@@ -20,8 +20,8 @@ FloatArray = npt.NDArray[np.float64]
 GRAVITY = 9.81
 POSE_SECONDS, IDLE_SECONDS = 0.35, 1.5
 """A shorter clip is a pose; a shorter one is no idle, s."""
-STILL_PELVIS, STILL_FOOT = 0.15, 0.6
-"""Somebody stands at an end of a clip when pelvis and both feet are slower, m/s: a swinging leg is faster."""
+STILL_PELVIS, STILL_FOOT, STILL_TURN = 0.15, 0.6, 0.8
+"""Somebody stands at an end of a clip when pelvis and both feet are slower, m/s, and turning is, rad/s."""
 OFF_GROUND = 0.03
 """A foot is in the air when all its points are higher than at the start by this, m."""
 SHORTEST_FLIGHT, SHORTEST_LEAP = 0.15, 0.06
@@ -105,7 +105,9 @@ def stands(motion: Retargeted, contacts: Contacts, end: int) -> bool:
     part = slice(None, count) if end == 0 else slice(-count, None)
     tracks = [motion.travel[part], *(contacts.points[part, foot, BALL] for foot in range(2))]
     speed = [np.linalg.norm(np.diff(track, axis=0), axis=1).mean() * motion.frame_rate for track in tracks]
-    return bool(speed[0] < STILL_PELVIS and max(speed[1:]) < STILL_FOOT)
+    heading = np.unwrap(heading_of(motion.rotation_local[part, 0]))
+    turn = abs(heading[-1] - heading[0]) * motion.frame_rate / (count - 1)
+    return bool(speed[0] < STILL_PELVIS and max(speed[1:]) < STILL_FOOT and turn < STILL_TURN)
 
 
 def longest_flight(contacts: Contacts, rate: float) -> tuple[float, float] | None:

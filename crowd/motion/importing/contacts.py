@@ -10,7 +10,7 @@ import numpy.typing as npt
 from crowd.motion.clip import FootEvent
 from crowd.motion.importing.axes import PosedSource
 from crowd.motion.importing.joint_names import JointMap
-from crowd.motion.importing.retarget import runs, sole_depth
+from crowd.motion.importing.retarget import middle_of_stances, runs, sole_depth
 from crowd.motion.rotation import rotate
 
 FloatArray = npt.NDArray[np.float64]
@@ -54,6 +54,11 @@ class Contacts:
     points: FloatArray
     ground: float
     is_loop: bool
+
+    @property
+    def foot_is_flat(self) -> BoolArray:
+        """Heel and ball of the right and left foot are down, (F, 2)."""
+        return np.asarray(self.is_down[:, :, HEEL] & self.is_down[:, :, BALL])
 
 
 def find_contacts(source: PosedSource, joints: JointMap, is_loop: bool) -> Contacts:
@@ -162,6 +167,21 @@ def intervals(is_down: BoolArray, rate: float, is_loop: bool) -> list[tuple[floa
         for begin, end in runs(doubled)
         if begin < period and not (begin == 0 and body[-1])
     ]
+
+
+def sole_heights(contacts: Contacts) -> FloatArray:
+    """Height of the lowest point of the right and the left foot over the ground, (F, 2), m.
+
+    By how much soles float or sink in the middle of their stances is taken off, also between them.
+    """
+    height = contacts.points[..., 1].min(axis=2) - contacts.ground
+    frames = np.arange(len(height))
+    for foot in range(2):
+        middle = middle_of_stances(contacts.foot_is_down[:, foot])
+        if middle.any():
+            floating = np.interp(frames, frames[middle], height[middle, foot])
+            height[:, foot] -= np.clip(floating, -LOW, LOW)
+    return np.asarray(np.maximum(height, 0.0))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from crowd.motion.clip import Clip, ClipKind, ClipQuality, FootEvent, JointMask
 from crowd.motion.importing.axes import PosedSource, convert, find_convention
 from crowd.motion.importing.classify import jump_labels, kind_of, look_at, reach_labels
 from crowd.motion.importing.clips import facing_of_feet, plain_clip, stance_drift
-from crowd.motion.importing.contacts import Contacts, Stance, find_contacts, find_stances
+from crowd.motion.importing.contacts import Contacts, Stance, find_contacts, find_stances, sole_heights
 from crowd.motion.importing.cycles import cyclic_clip, find_window, heading_of, is_loop, sample, sample_linear
 from crowd.motion.importing.joint_names import JointMap, map_joints, read_mapping
 from crowd.motion.importing.labels import Correction
@@ -116,7 +116,9 @@ def import_clip(
     convention = find_convention(motion, joints, settings.units, settings.up)
     source = cut(resampled(convert(motion, convention)), told, motion)
     contacts = find_contacts(source, joints, is_loop=False)
-    moved, popped = without_pops(retarget(source, joints, skeleton, contacts.foot_is_down, contacts.ground))
+    moved, popped = without_pops(
+        retarget(source, joints, skeleton, contacts.foot_is_flat, sole_heights(contacts), contacts.ground)
+    )
     loops = is_loop(moved, skeleton) if told.cyclic is None else told.cyclic
     if loops:
         contacts = find_contacts(source, joints, is_loop=True)

@@ -21,8 +21,12 @@ LONGEST = 0.9985
 TOE_DOWN = 0.06
 """A toe that the source does not move bends to the ground while the ball is nearer than this, m."""
 MOST_TIP = np.radians(22.0)
-TIP_FADE = 0.12
-"""After a foot has left the ground, what it was tipped fades over this time, s."""
+NEAR_GROUND = 0.05
+"""A foot higher than this swings freely, m."""
+TOE_LENGTH = 0.05
+"""Tip of the toes before the ball, m."""
+SOLE_BELOW_JOINTS = 0.015
+"""Sole below the lowest joint of a foot, m."""
 LIMBS = {
     "upper_arm": "forearm",
     "forearm": "hand",
@@ -68,7 +72,12 @@ def leg_scale(source: PosedSource, joints: JointMap) -> float:
 
 
 def retarget(
-    source: PosedSource, joints: JointMap, skeleton: Skeleton, is_down: npt.NDArray[np.bool_], ground: float
+    source: PosedSource,
+    joints: JointMap,
+    skeleton: Skeleton,
+    is_flat: npt.NDArray[np.bool_],
+    soles: FloatArray,
+    ground: float,
 ) -> Retargeted:
     """Put a motion onto the project's skeleton.
 
@@ -78,8 +87,10 @@ def retarget(
     joints : JointMap
     skeleton : Skeleton
         The project's; rest frames along the world's axes.
-    is_down : (F, 2) bool
-        The right and the left foot are on the ground.
+    is_flat : (F, 2) bool
+        Heel and ball of the right and the left foot are on the ground.
+    soles : (F, 2) float64
+        Height of the lowest point of the right and the left foot over the ground, m.
     ground : float
         Height of the ground under the source, m.
 
@@ -87,18 +98,16 @@ def retarget(
     -----
     Rotations are carried over in world space against both rest poses; limb segments are first aimed like the
     source's in its rest pose, so that a T-pose and hanging arms agree. Feet then stay where the source's are
-    (times the ratio of leg lengths), soles on the ground while down, and the legs bend to meet them.
+    (times the ratio of leg lengths), soles as high over the ground, and the legs bend to meet them.
     """
     scale = leg_scale(source, joints)
     rotation = world_rotations(source, joints, skeleton)
-    level_feet(rotation, skeleton, is_down)
+    level_feet(rotation, skeleton, is_flat)
     pelvis = place_pelvis(source, joints, skeleton, rotation, scale, ground)
-    ankles = place_ankles(source, joints, skeleton, rotation, scale, is_down, ground)
+    ankles = place_ankles(source, joints, skeleton, rotation, scale, ground, soles)
     pelvis = within_reach(pelvis, rotation, skeleton, ankles)
     for side, ankle in zip(("right", "left"), ankles, strict=True):
         bend_leg(rotation, skeleton, side, pelvis, ankle)
-        if f"{side}_toe" not in joints.joint:
-            bend_toe(rotation, skeleton, side, ankle)
     local = rotation.copy()
     for joint, parent in enumerate(skeleton.parent):
         if parent >= 0:
@@ -168,15 +177,15 @@ def rest_aim(source: PosedSource, joints: JointMap, skeleton: Skeleton, role: st
     return swing(ours, way) if np.linalg.norm(way) > 1e-6 else still
 
 
-def level_feet(rotation: FloatArray, skeleton: Skeleton, is_down: npt.NDArray[np.bool_]) -> None:
-    """Turn each foot by a constant so that its sole is level on average in the middle of its stances."""
+def level_feet(rotation: FloatArray, skeleton: Skeleton, is_flat: npt.NDArray[np.bool_]) -> None:
+    """Turn each foot by a constant so that its sole is level on average while heel and ball are down."""
     for column, side in enumerate(("right", "left")):
         foot, toe = skeleton.joint(f"{side}_foot"), skeleton.joint(f"{side}_toe")
-        middle = middle_of_stances(is_down[:, column])
-        if not middle.any():
+        flat = is_flat[:, column]
+        if not flat.any():
             continue
         # Up, in the frame of the foot: level when it is +y.
-        up = rotate(conjugate(rotation[middle, foot]), np.array([0.0, 1.0, 0.0])).mean(axis=0)
+        up = rotate(conjugate(rotation[flat, foot]), np.array([0.0, 1.0, 0.0])).mean(axis=0)
         tilt = swing(np.array([0.0, 1.0, 0.0]), up)
         rotation[:, foot] = multiply(rotation[:, foot], tilt)
         rotation[:, toe] = multiply(rotation[:, toe], tilt)
@@ -214,12 +223,16 @@ def place_pelvis(
 
 
 def sole_depth(source: PosedSource, joints: JointMap) -> float:
-    """Height of the source's ankles over the ground in its rest pose, m."""
+    """Height of the source's ankles over the ground in its rest pose, m.
+
+    A rest pose that stands on y = 0 tells; otherwise the sole lies a little below the lowest joint of a foot.
+    """
     rest = source.rest_position
     feet = [joint for role, joint in joints.joint.items() if role.endswith(("foot", "toe", "toe_end"))]
     lowest = rest[feet, 1].min()
     ankle = np.mean([rest[joints.joint[f"{side}_foot"], 1] for side in SIDES])
-    return float(np.clip(ankle - lowest, 0.04, 0.14))
+    stands = -0.01 < lowest < 0.06
+    return float(np.clip(ankle if stands else ankle - lowest + SOLE_BELOW_JOINTS, 0.04, 0.14))
 
 
 def place_ankles(
@@ -228,61 +241,61 @@ def place_ankles(
     skeleton: Skeleton,
     rotation: FloatArray,
     scale: float,
-    is_down: npt.NDArray[np.bool_],
     ground: float,
+    soles: FloatArray,
 ) -> FloatArray:
-    """Ankle positions (2, F, 3), right and left, with soles on the ground while down and never below it."""
+    """Ankle positions (2, F, 3), right and left; soles are as high over the ground as the source's.
+
+    Parameters
+    ----------
+    source, joints, skeleton, rotation, scale, ground
+        See `retarget`; feet in `rotation` are tipped where they are shorter than the source's.
+    soles : (F, 2) float64
+        Height of the lowest point of the source's right and left foot over the ground, m.
+    """
     depth = sole_depth(source, joints)
-    heel, ball = sole_points()
     result = []
     for column, side in enumerate(("right", "left")):
         ankle = scale * source.position[:, joints.joint[f"{side}_foot"]]
-        ankle[:, 1] = scale * (ankle[:, 1] / scale - ground - depth) - heel[1]
-        press_ball(rotation, skeleton, side, ankle, is_down[:, column], source.frame_rate)
-        foot = rotation[:, skeleton.joint(f"{side}_foot")]
-        lowest = ankle[:, 1] + np.minimum(rotate(foot, heel)[:, 1], rotate(foot, ball)[:, 1])
-        result.append(ankle + np.outer(lift(lowest, is_down[:, column], source.frame_rate), (0.0, 1.0, 0.0)))
+        ankle[:, 1] -= scale * (ground + depth) + sole_points()[0][1]
+        if f"{side}_toe" not in joints.joint:
+            bend_toe(rotation, skeleton, side, ankle)
+        height = scale * soles[:, column]
+        nearness = np.clip(1.0 - height / NEAR_GROUND, 0.0, 1.0)
+        tip_forward(rotation, skeleton, side, ankle[:, 1] - height, nearness)
+        lowest = lowest_point(rotation, skeleton, side, ankle[:, 1])
+        ankle[:, 1] += np.maximum(nearness * (height - lowest), -lowest)
+        result.append(ankle)
     return np.array(result)
 
 
-def press_ball(
-    rotation: FloatArray,
-    skeleton: Skeleton,
-    side: str,
-    ankle: FloatArray,
-    is_down: npt.NDArray[np.bool_],
-    frame_rate: float,
+def lowest_point(rotation: FloatArray, skeleton: Skeleton, side: str, ankle_height: FloatArray) -> FloatArray:
+    """Height (F,) of the lowest of heel, ball and tip of a foot whose ankle is at the given height, m."""
+    foot, toe = (rotation[:, skeleton.joint(f"{side}_{part}")] for part in ("foot", "toe"))
+    heel, ball = sole_points()
+    joint = skeleton.offset[skeleton.joint(f"{side}_toe")]
+    tip = rotate(foot, joint) + rotate(toe, ball - joint + (0.0, 0.0, TOE_LENGTH))
+    below = [rotate(foot, heel)[:, 1], rotate(foot, ball)[:, 1], tip[:, 1]]
+    return np.asarray(ankle_height + np.min(below, axis=0))
+
+
+def tip_forward(
+    rotation: FloatArray, skeleton: Skeleton, side: str, ankle_height: FloatArray, nearness: FloatArray
 ) -> None:
-    """Tip a foot that is down forward where neither heel nor ball reaches the ground.
+    """Tip a foot forward where its ankle is too high for heel, ball or tip to reach height 0.
 
     A foot shorter than the source's would hang in the air as soon as the heel rises, or pull the body down.
+    Feet far from the ground, of low `nearness`, are left alone.
     """
-    heel, ball = sole_points()
     foot = skeleton.joint(f"{side}_foot")
-    reach = np.zeros(len(ankle))
+    before = rotation[:, foot].copy()
+    angle = np.zeros(len(ankle_height))
     for _ in range(3):
-        tip = about(0, reach)
-        world = multiply(rotation[:, foot], tip)
-        to_ball = rotate(world, ball)
-        gap = ankle[:, 1] + np.minimum(rotate(world, heel)[:, 1], to_ball[:, 1])
-        lever = np.maximum(np.hypot(to_ball[:, 0], to_ball[:, 2]), 0.04)
-        reach = np.where(is_down, np.clip(reach + gap / lever, 0.0, MOST_TIP), 0.0)
-    frames = np.arange(len(ankle))
-    if not reach.any():
-        return
-    held = np.interp(frames, frames[is_down], reach[is_down])
-    away = np.abs(frames[:, None] - frames[is_down]).min(axis=1) / frame_rate
-    held *= np.clip(1.0 - away / TIP_FADE, 0.0, 1.0)
-    rotation[:, foot] = multiply(rotation[:, foot], about(0, smoothed(held, round(0.03 * frame_rate))))
-
-
-def lift(lowest: FloatArray, is_down: npt.NDArray[np.bool_], frame_rate: float) -> FloatArray:
-    """Heights (F,) to add so that a sole is at 0 while down, and above elsewhere; changes are spread."""
-    frames = np.arange(len(lowest))
-    if not is_down.any():
-        return np.maximum(-lowest, 0.0)
-    wanted = np.interp(frames, frames[is_down], -lowest[is_down])
-    return np.maximum(smoothed(wanted, round(0.03 * frame_rate)), -lowest)
+        gap = lowest_point(rotation, skeleton, side, ankle_height)
+        to_ball = rotate(rotation[:, foot], sole_points()[1])
+        lever = np.maximum(np.hypot(to_ball[:, 0], to_ball[:, 2]), 0.06)
+        angle = np.clip(angle + gap / lever, 0.0, MOST_TIP)
+        rotation[:, foot] = multiply(before, about(0, nearness * angle))
 
 
 def smoothed(values: FloatArray, reach: int) -> FloatArray:
