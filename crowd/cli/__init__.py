@@ -1,4 +1,4 @@
-"""The command line: ``crowd run``, ``crowd list``, ``crowd bench``.
+"""The command line: ``crowd run``, ``crowd list``, ``crowd motions``, ``crowd bench``.
 
 Exit codes: 0 done; 1 the run is not what the scenario expects (with ``--check``), or a benchmark case failed;
 2 something that the user gave cannot be used; 130 stopped by Ctrl-C.
@@ -47,6 +47,19 @@ def bench(context: typer.Context) -> None:
     from crowd.bench.command import app as bench_app
 
     result = bench_app(args=list(context.args), prog_name="crowd bench", standalone_mode=False)
+    if isinstance(result, int) and result:
+        raise typer.Exit(result)
+
+
+@app.command(
+    add_help_option=False,
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+)
+def motions(context: typer.Context) -> None:
+    """Import captured motion, and show motion libraries (see ``crowd motions --help``)."""
+    from crowd.cli.motions import app as motions_app
+
+    result = motions_app(args=list(context.args), prog_name="crowd motions", standalone_mode=False)
     if isinstance(result, int) and result:
         raise typer.Exit(result)
 

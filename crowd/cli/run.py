@@ -16,6 +16,7 @@ import typer
 from crowd.errors import SettingsError, describe
 
 if TYPE_CHECKING:
+    from crowd.motion.library import MotionLibrary
     from crowd.recording import Recorder
     from crowd.scenario import Scenario
     from crowd.simulation import Simulation
@@ -33,7 +34,9 @@ def run(
         float | None, typer.Option(help="Simulated time; the scenario's own, or until all have arrived.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Key of all random choices.")] = 0,
-    motions: Annotated[Path | None, typer.Option(help="Folder of a motion library.")] = None,
+    motions: Annotated[
+        Path | None, typer.Option(help="Motion library made by `crowd motions import`.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show the run in a window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Write a video.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Write a picture of the last frame.")] = None,
@@ -45,16 +48,18 @@ def run(
     ] = False,
 ) -> int:
     """Run a scenario and print a summary."""
-    _refuse_what_is_missing(motions=motions, view=view, video=video, picture=picture)
+    _refuse_what_is_missing(view=view, video=video, picture=picture)
     if seconds is not None and not 0.0 < seconds <= 86_400.0:
         raise SettingsError(describe("--seconds", "is out of range", seconds, "> 0 to 86400"))
     from crowd.cli.output import require_folder, write_json
+    from crowd.motion.library_file import load_library
     from crowd.scenario import load_scenario
 
     require_folder("--record", record)
     require_folder("--metrics", metrics)
     loaded = load_scenario(scenario)
-    simulation, compile_seconds = _prepare(loaded, seed, threads, characters)
+    library = None if motions is None else load_library(motions)
+    simulation, compile_seconds = _prepare(loaded, seed, threads, characters, library)
     recorder = _open_recorder(record, simulation)
     wall_seconds, was_stopped = _advance(simulation, recorder, seconds)
     measured = measured_facts(simulation, wall_seconds, compile_seconds, was_stopped=was_stopped)
@@ -70,9 +75,7 @@ def run(
     return EXIT_NOT_AS_EXPECTED if check and not all(verdict.is_met for verdict in verdicts) else 0
 
 
-def _refuse_what_is_missing(
-    *, motions: Path | None, view: bool, video: Path | None, picture: Path | None
-) -> None:
+def _refuse_what_is_missing(*, view: bool, video: Path | None, picture: Path | None) -> None:
     """Refuse options whose parts this version does not have.
 
     Raises
@@ -80,15 +83,6 @@ def _refuse_what_is_missing(
     SettingsError
         One of them was given.
     """
-    if motions is not None:
-        raise SettingsError(
-            describe(
-                "--motions",
-                "motion libraries cannot be read in this version",
-                str(motions),
-                "the built-in one",
-            )
-        )
     for option, is_given in (
         ("--view", view),
         ("--video", video is not None),
@@ -101,7 +95,11 @@ def _refuse_what_is_missing(
 
 
 def _prepare(
-    scenario: Scenario, seed: int, threads: int | None, characters: int | None
+    scenario: Scenario,
+    seed: int,
+    threads: int | None,
+    characters: int | None,
+    library: MotionLibrary | None,
 ) -> tuple[Simulation, float]:
     """Compile kernels with a progress line and build the simulation; also returns compile time, s."""
     from rich.console import Console
@@ -110,7 +108,9 @@ def _prepare(
 
     console = Console(stderr=True)
     with console.status("placing people") as status:
-        simulation = crowd.Simulation(scenario, seed=seed, threads=threads, characters=characters)
+        simulation = crowd.Simulation(
+            scenario, seed=seed, threads=threads, characters=characters, motions=library
+        )
         begin = time.perf_counter()
         crowd.warm_up(
             lambda stage: status.update(f"compiling kernels (first run only): {stage}"),
