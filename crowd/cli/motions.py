@@ -11,9 +11,14 @@ import typer
 from crowd.errors import SettingsError, describe
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from crowd.motion.clip import Clip
     from crowd.motion.importing.example_set import Coverage
     from crowd.motion.importing.folder import ImportReport
+
+LEAST_WIDTH = 170
+"""Columns of a table, also where the terminal has fewer."""
 
 app = typer.Typer(
     help="Import captured motion into a library, and show what a library holds.",
@@ -152,7 +157,6 @@ def print_report(report: ImportReport) -> None:
 def print_clips(clips: list[Clip] | tuple[Clip, ...]) -> None:
     """Print the table of clips: what they serve, parameters, quality."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=box.SIMPLE, pad_edge=False)
@@ -175,7 +179,17 @@ def print_clips(clips: list[Clip] | tuple[Clip, ...]) -> None:
             "" if quality is None or not quality.flight_gravity else f"{quality.flight_gravity:.1f}",
             labels_in_words(clip),
         )
-    Console().print(table)
+    print_wide(table)
+
+
+def print_wide(table: Table) -> None:
+    """Print a table without folding its cells: names and figures are copied from it."""
+    from rich.console import Console
+
+    for column in table.columns:
+        column.no_wrap = True
+    console = Console()
+    Console(width=max(console.width, LEAST_WIDTH)).print(table)
 
 
 def labels_in_words(clip: Clip) -> str:
@@ -197,10 +211,9 @@ def labels_in_words(clip: Clip) -> str:
 def print_coverage(coverage: tuple[Coverage, ...]) -> None:
     """Print what the examples cover and where they come from."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
     table = Table("a crowd needs", "comes from", "examples", box=box.SIMPLE, pad_edge=False)
     for entry in coverage:
         table.add_row(entry.need, entry.origin, ", ".join(entry.clips))
-    Console().print(table)
+    print_wide(table)

@@ -1,191 +1,167 @@
-"""BVH: a hierarchy with offsets and channels, then one row of numbers for each frame."""
+"""Biovision hierarchy (.bvh): skeleton and frames in one text file."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from crowd.errors import MotionError, describe
-from crowd.motion.formats.euler import from_euler
-from crowd.motion.formats.text import at_line, number, read_rows, read_text, whole_number
-from crowd.motion.source import SourceMotion, SourceSkeleton
+from crowd.motion.formats.euler import AXES, compose
+from crowd.motion.formats.joint_list import IDENTITY, JointList, check_size, rest_positions, stated_rate
+from crowd.motion.formats.text import TextFile, Tokens
+from crowd.motion.source import FloatArray, SourceMotion, SourceSkeleton
 
-CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
-_CHANNEL_OF = {name.lower(): name for name in CHANNELS}
+CHANNEL_NAMES = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in AXES)
+_CHANNELS = {name.upper(): (number // 3, number % 3) for number, name in enumerate(CHANNEL_NAMES)}
+POSITION = 0
 
 
 @dataclass
-class _Joint:
-    name: str
-    parent: int
+class _Block:
+    """A block of the hierarchy that is open."""
+
+    joint: int
     line: int
-    offset: list[float] = field(default_factory=list)
-    channels: list[str] = field(default_factory=list)
+    is_end: bool
+    has_offset: bool = False
+    has_channels: bool = False
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One number of a row: the joint, position (0) or rotation (1), and the axis."""
+
+    joint: int
+    kind: int
+    axis: int
 
 
 def read_bvh(path: Path) -> SourceMotion:
     """Read a BVH file.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    SourceMotion
-        End sites are joints named ``PARENT_end``.
+    Rotations compose in the order of their channels, the first listed outermost. Position channels replace
+    the offset of their joint.
 
     Raises
     ------
     MotionError
-        The file is broken; its line is named.
-
-    Notes
-    -----
-    Rotations multiply in listed order, first listed outermost; position channels replace the offset. Of the
-    declared count of frames and the rows, which many programs let differ by one, the rows are right.
+        The file is broken; names the line.
     """
-    lines = read_text(path).splitlines()
-    joints, motion_line = _read_hierarchy(lines, path)
-    width = sum(len(joint.channels) for joint in joints)
-    frames, frame_time, first = _read_header(lines, motion_line, path)
-    values = read_rows(lines[first:], range(first + 1, len(lines) + 1), width, path)
-    if len(values) == 0:
-        raise MotionError(describe(at_line(path, len(lines)), "there are no frames"))
-    if frames > 0 and abs(frames - len(values)) > 1:
-        raise MotionError(
-            describe(
-                at_line(path, motion_line + 2), "declares another count of frames than it has rows",
-                frames, f"{len(values)} rows",
-            )
-        )  # fmt: skip
-    count = len(joints)
-    offset = np.array([joint.offset for joint in joints])
-    if not np.any(offset[1:]):
-        raise MotionError(describe(at_line(path, joints[0].line), "all offsets are zero"))
-    rotation = np.zeros((len(values), count, 4))
-    rotation[..., 0] = 1.0
-    position = np.broadcast_to(offset, (len(values), count, 3)).copy()
-    column = 0
-    for index, joint in enumerate(joints):
-        part = values[:, column : column + len(joint.channels)]
-        column += len(joint.channels)
-        turns = [place for place, channel in enumerate(joint.channels) if channel.endswith("rotation")]
-        if turns:
-            axes = "".join(joint.channels[place][0] for place in turns)
-            rotation[:, index] = from_euler(np.radians(part[:, turns]), axes)
-        for place, channel in enumerate(joint.channels):
-            if channel.endswith("position"):
-                position[:, index, "XYZ".index(channel[0])] = part[:, place]
-    skeleton = SourceSkeleton(
-        tuple(joint.name for joint in joints),
-        np.array([joint.parent for joint in joints], np.int32),
-        offset,
-        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-        np.array([any(name.endswith("rotation") for name in joint.channels) for joint in joints]),
-    )
-    return SourceMotion(path, path.stem, skeleton, 1.0 / frame_time, rotation, position)
+    text = TextFile(path)
+    skeleton, channels, line = read_hierarchy(text)
+    values, frame_time = _read_frames(text, line, len(channels))
+    check_size(path, len(values), skeleton.joint_count)
+    rotation, position = _pose(skeleton, channels, values)
+    return SourceMotion(path, path.stem, skeleton, stated_rate(frame_time), rotation, position)
 
 
-def _read_hierarchy(lines: list[str], path: Path) -> tuple[list[_Joint], int]:
-    """Read joints; also returns the index of the line ``MOTION``."""
-    joints: list[_Joint] = []
-    open_joints: list[int] = []
-    names: set[str] = set()
-    awaits_brace = False
-    saw_hierarchy = False
-    for index, text in enumerate(lines):
-        tokens = text.split()
-        if not tokens:
-            continue
-        line, word = index + 1, tokens[0].upper()
-        if word == "HIERARCHY":
-            saw_hierarchy = True
-        elif not saw_hierarchy:
-            raise MotionError(describe(at_line(path, line), "is no BVH file", tokens[0][:40], "HIERARCHY"))
-        elif word in ("ROOT", "JOINT", "END"):
-            if (word == "ROOT") != (not open_joints) or (word == "ROOT" and joints):
-                raise MotionError(describe(at_line(path, line), f"{tokens[0]} is misplaced"))
-            parent = open_joints[-1] if open_joints else -1
-            name = " ".join(tokens[1:]) if word != "END" else f"{joints[parent].name}_end"
-            if word == "END" and name in names:
-                name = f"{name}{len(joints)}"
-            if not name or name in names:
-                raise MotionError(describe(at_line(path, line), "joint name is missing or used twice", name))
-            names.add(name)
-            joints.append(_Joint(name, parent, line))
-            awaits_brace = True
-            if tokens[-1] == "{":
-                raise MotionError(describe(at_line(path, line), "a brace belongs on a line of its own"))
-        elif word == "{":
-            if not awaits_brace:
-                raise MotionError(describe(at_line(path, line), "an opening brace is misplaced"))
-            open_joints.append(len(joints) - 1)
-            awaits_brace = False
-        elif word == "}":
-            if not open_joints or awaits_brace:
-                raise MotionError(describe(at_line(path, line), "a closing brace is misplaced"))
-            closed = joints[open_joints.pop()]
-            if not closed.offset:
-                raise MotionError(describe(at_line(path, closed.line), "joint has no OFFSET", closed.name))
-        elif word in ("OFFSET", "CHANNELS") and open_joints and not awaits_brace:
-            _read_item(tokens, joints[open_joints[-1]], path, line)
-        elif word == "MOTION":
-            if open_joints or awaits_brace or not joints:
-                raise MotionError(
-                    describe(at_line(path, line), "MOTION comes before the hierarchy is closed")
-                )
-            return joints, index
+def read_hierarchy(text: TextFile) -> tuple[SourceSkeleton, list[Channel], int]:
+    """Read all blocks up to ``MOTION``; gives its line too."""
+    tokens = Tokens(text)
+    if tokens.take("HIERARCHY").upper() != "HIERARCHY":
+        tokens.fail("a BVH file starts with HIERARCHY")
+    joints = JointList(text.fail)
+    channels: list[Channel] = []
+    open_blocks: list[_Block] = []
+    while True:
+        word = tokens.take("a joint, a closing brace or MOTION")
+        match word.upper():
+            case "MOTION" if not open_blocks:
+                return joints.build(tokens.line), channels, tokens.line
+            case "MOTION":
+                tokens.fail(f"the block of line {open_blocks[-1].line} is not closed before MOTION")
+            case "ROOT" | "JOINT" | "END" as kind:
+                open_blocks.append(_open_block(tokens, joints, kind, open_blocks))
+            case "OFFSET" | "CHANNELS" | "}" if not open_blocks:
+                tokens.fail("stands outside all joints", word)
+            case "OFFSET":
+                open_blocks[-1].has_offset = True
+                joints.offset[open_blocks[-1].joint] = tokens.take_numbers(3, "an offset")
+            case "CHANNELS":
+                added = _read_channels(tokens, open_blocks[-1])
+                joints.is_animated[open_blocks[-1].joint] = any(entry.kind != POSITION for entry in added)
+                channels += added
+            case "}":
+                if not open_blocks.pop().has_offset:
+                    tokens.fail("the joint that is closed here has no OFFSET")
+            case _:
+                tokens.fail("unknown word", word, "ROOT, JOINT, End Site, OFFSET, CHANNELS, braces, MOTION")
+
+
+def _open_block(tokens: Tokens, joints: JointList, kind: str, open_blocks: list[_Block]) -> _Block:
+    line = tokens.line
+    name = tokens.take_name("the name of a joint")
+    if (kind == "ROOT") != (not open_blocks):
+        tokens.text.fail(line, "a ROOT stands outside all joints, all others inside", kind)
+    if open_blocks and open_blocks[-1].is_end:
+        tokens.text.fail(line, "an End Site holds no joint", name)
+    above = open_blocks[-1].joint if open_blocks else -1
+    is_end = kind == "END"
+    return _Block(joints.add_end(above, line) if is_end else joints.add(name, above, line), line, is_end)
+
+
+def _read_channels(tokens: Tokens, block: _Block) -> list[Channel]:
+    if block.has_channels or block.is_end:
+        tokens.fail("an End Site has no CHANNELS, a joint has them once")
+    block.has_channels = True
+    found: list[Channel] = []
+    for _ in range(tokens.take_integer("the number of channels")):
+        name = tokens.take("a channel")
+        if name.upper() not in _CHANNELS:
+            tokens.fail("unknown channel", name, ", ".join(CHANNEL_NAMES))
+        channel = Channel(block.joint, *_CHANNELS[name.upper()])
+        if channel in found:
+            tokens.fail("a channel is listed twice", name)
+        found.append(channel)
+    return found
+
+
+def _read_frames(text: TextFile, motion_line: int, width: int) -> tuple[FloatArray, float]:
+    """Rows after ``MOTION`` and the frame time; the declared number of rows may be wrong by one."""
+    filled = [number for number, line in enumerate(text.lines[motion_line:], motion_line + 1) if line.strip()]
+    if len(filled) < 2:
+        text.fail(len(text.lines), "ends where Frames and Frame Time should follow")
+    declared = text.integer(_value_of(text, filled[0], "frames"), filled[0], "Frames")
+    frame_time = text.number(_value_of(text, filled[1], "frame time"), filled[1], "Frame Time")
+    if not 1e-6 <= frame_time <= 1e3:
+        text.fail(filled[1], "Frame Time is out of range", frame_time, "0.000001 to 1000 s")
+    lines = filled[2:]
+    if not lines:
+        text.fail(filled[0], "holds no frames")
+    if abs(declared - len(lines)) > 1:
+        text.fail(filled[0], f"Frames: {declared}, but {len(lines)} rows follow")
+    if width == 0:
+        text.fail(motion_line, "holds no channels")
+    return text.table([text.lines[line - 1] for line in lines], lines, width, "a frame"), frame_time
+
+
+def _value_of(text: TextFile, line: int, key: str) -> str:
+    """What follows a key and a colon."""
+    content = " ".join(text.lines[line - 1].split())
+    if not content.lower().startswith(key):
+        text.fail(line, f'"{key.title()}:" should stand here', content)
+    return content[len(key) :].lstrip(" :\t")
+
+
+def _pose(
+    skeleton: SourceSkeleton, channels: list[Channel], values: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Rotations and positions of all frames, joints with equal axes at once."""
+    position = rest_positions(skeleton, len(values))
+    turned: dict[int, list[int]] = defaultdict(list)
+    for column, channel in enumerate(channels):
+        if channel.kind == POSITION:
+            position[:, channel.joint, channel.axis] = values[:, column]
         else:
-            raise MotionError(describe(at_line(path, line), "cannot be understood", tokens[0][:40]))
-    raise MotionError(describe(at_line(path, len(lines)), "ends before MOTION"))
-
-
-def _read_item(tokens: list[str], joint: _Joint, path: Path, line: int) -> None:
-    if tokens[0].upper() == "OFFSET":
-        if len(tokens) != 4 or joint.offset:
-            raise MotionError(describe(at_line(path, line), "OFFSET takes three numbers, once for a joint"))
-        joint.offset = [number(token, path, line, "offset") for token in tokens[1:]]
-        return
-    if joint.channels:
-        raise MotionError(describe(at_line(path, line), "joint has CHANNELS twice", joint.name))
-    count = whole_number(tokens[1] if len(tokens) > 1 else "", path, line, "count of channels")
-    if len(tokens) - 2 != count:
-        raise MotionError(
-            describe(at_line(path, line), "lists another count of channels", len(tokens) - 2, str(count))
-        )
-    for token in tokens[2:]:
-        if token.lower() not in _CHANNEL_OF:
-            allowed = ", ".join(CHANNELS)
-            raise MotionError(describe(at_line(path, line), "unknown channel", token, allowed))
-        joint.channels.append(_CHANNEL_OF[token.lower()])
-    if len(set(joint.channels)) != len(joint.channels):
-        raise MotionError(describe(at_line(path, line), "a channel is listed twice", joint.name))
-
-
-def _read_header(lines: list[str], motion_line: int, path: Path) -> tuple[int, float, int]:
-    """Frames, frame time in s, and the index of the first row."""
-    frames: int | None = None
-    for index in range(motion_line + 1, len(lines)):
-        tokens = lines[index].replace(":", ": ").split()
-        if not tokens:
-            continue
-        line = index + 1
-        if tokens[0].lower() == "frames:" and frames is None:
-            frames = whole_number(tokens[1] if len(tokens) == 2 else "", path, line, "count of frames")
-        elif tokens[0].lower() == "frame" and len(tokens) == 3 and tokens[1].lower() == "time:":
-            if frames is None:
-                raise MotionError(describe(at_line(path, line), "Frames: is missing"))
-            seconds = number(tokens[2], path, line, "frame time")
-            if not 1e-5 < seconds < 10.0:
-                raise MotionError(
-                    describe(at_line(path, line), "frame time is out of range", seconds, "0.00001 to 10 s")
-                )
-            return frames, seconds, index + 1
-        else:
-            raise MotionError(
-                describe(at_line(path, line), "cannot be understood", tokens[0][:40], "Frames:, Frame Time:")
-            )
-    raise MotionError(describe(at_line(path, len(lines)), "ends before Frame Time:"))
+            turned[channel.joint].append(column)
+    alike: dict[tuple[int, ...], list[int]] = defaultdict(list)
+    for joint, columns in turned.items():
+        alike[tuple(channels[column].axis for column in columns)].append(joint)
+    rotation = np.empty((len(values), skeleton.joint_count, 4))
+    rotation[:] = IDENTITY
+    for axes, joints in alike.items():
+        angles = np.radians(values[:, [turned[joint] for joint in joints]])
+        rotation[:, joints] = compose(axes, angles)
+    return rotation, position

@@ -1,18 +1,34 @@
-"""Rotations about coordinate axes, as motion files state them."""
-
-from __future__ import annotations
+"""Axis angles of many joints and frames into quaternions."""
 
 import numpy as np
-import numpy.typing as npt
 
-from crowd.motion.rotation import about, multiply
+from crowd.motion.source import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
+AXES = "XYZ"
 
 
-def from_euler(angles: FloatArray, axes: str) -> FloatArray:
-    """Compose rotations (..., 4) from angles (..., n) in rad; the first listed axis is the outermost."""
-    result = about("XYZ".index(axes[0]), angles[..., 0])
-    for place, axis in enumerate(axes[1:], 1):
-        result = multiply(result, about("XYZ".index(axis), angles[..., place]))
-    return result
+def compose(axes: tuple[int, ...], angles: FloatArray) -> FloatArray:
+    """Compose rotations about fixed axes; the first listed acts last.
+
+    Parameters
+    ----------
+    axes : tuple of int
+        0 to 2 for x to z, one for each angle.
+    angles : (..., len(axes)) float64
+        rad.
+
+    Returns
+    -------
+    (..., 4) float64
+        Unit quaternions (w, x, y, z).
+    """
+    half = 0.5 * angles
+    cosine, sine = np.cos(half), np.sin(half)
+    parts = [np.zeros(angles.shape[:-1]) for _ in range(4)]
+    parts[0] += 1.0
+    for number, axis in enumerate(axes):
+        c, s = cosine[..., number], sine[..., number]
+        w, i, j, k = parts[0], parts[1 + axis], parts[1 + (axis + 1) % 3], parts[1 + (axis + 2) % 3]
+        parts[0], parts[1 + axis] = c * w - s * i, c * i + s * w
+        parts[1 + (axis + 1) % 3], parts[1 + (axis + 2) % 3] = c * j + s * k, c * k - s * j
+    return np.stack(parts, axis=-1)

@@ -1,142 +1,172 @@
-"""Text files of motion: read with any encoding, numbers in bulk, errors with their line."""
+"""Text files as lines and tokens, with errors that name the line."""
 
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
 from crowd.errors import MotionError, describe
+from crowd.motion.source import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
-
-LARGEST_FILE = 1 << 30
-"""Larger files are refused, bytes."""
-
-
-def read_text(path: Path) -> str:
-    """Read a text file; bytes that are not UTF-8 are read as Latin-1.
-
-    Raises
-    ------
-    MotionError
-        The file cannot be read, is empty, too large, or binary.
-    """
-    content = read_bytes(path)
-    if b"\0" in content:
-        raise MotionError(describe(str(path), f"is binary, not text: a zero at byte {content.index(0)}"))
-    if not content.strip():
-        raise MotionError(describe(str(path), "is empty"))
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
+MAXIMUM_BYTES = 2**30
+MAXIMUM_NUMBER = 1e12
+"""Larger numbers are no angles, lengths or times, and their squares overflow."""
+WORD = re.compile(r"[{}]|[^\s{}]+")
+_INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a whole file.
-
-    Raises
-    ------
-    MotionError
-        The file cannot be read or is too large.
-    """
+    """Content of a file that exists and is of sensible size."""
+    if not path.is_file():
+        raise MotionError(describe(str(path), "there is no such file"))
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            size = f"{path.stat().st_size} bytes"
-            raise MotionError(describe(str(path), "is too large", size, f"up to {LARGEST_FILE} bytes"))
+        size = path.stat().st_size
+        if size > MAXIMUM_BYTES:
+            raise MotionError(describe(str(path), "is too large", f"{size} bytes", f"{MAXIMUM_BYTES}"))
         return path.read_bytes()
     except OSError as error:
-        raise MotionError(describe(str(path), "cannot be read", error.strerror or str(error))) from error
+        raise MotionError(describe(str(path), f"cannot be read ({error.strerror})")) from error
 
 
-def at_line(path: Path, line: int) -> str:
-    """Where something is, for a message; lines count from 1."""
-    return f"{path}:{line}"
+class TextFile:
+    """A text file, by lines.
 
-
-def number(token: str, path: Path, line: int, what: str) -> float:
-    """Read a finite number.
-
-    Raises
-    ------
-    MotionError
-        It is none.
-    """
-    try:
-        value = float(token)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise MotionError(describe(at_line(path, line), f"{what} is no finite number", token))
-    return value
-
-
-def whole_number(token: str, path: Path, line: int, what: str) -> int:
-    """Read a whole number >= 0.
-
-    Raises
-    ------
-    MotionError
-        It is none.
-    """
-    if not token.isascii() or not token.isdigit() or len(token) > 18:
-        raise MotionError(describe(at_line(path, line), f"{what} is no whole number", token, "0 or more"))
-    return int(token)
-
-
-def read_rows(lines: Sequence[str], line_numbers: Sequence[int], columns: int, path: Path) -> FloatArray:
-    """Read rows of numbers, one row on each line that is not blank.
-
-    Parameters
+    Attributes
     ----------
-    lines : sequence of str
-    line_numbers : sequence of int
-        Where each one stands in the file.
-    columns : int
-        Numbers in a row.
     path : Path
-
-    Returns
-    -------
-    (rows, columns) float64
-
-    Raises
-    ------
-    MotionError
-        A row has another count, or something is no finite number; the first such line is named.
+    lines : list of str
+        Without line ends.
     """
-    rows = [line for line in lines if line.strip()]
-    if not rows:
-        return np.zeros((0, columns))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        content = read_bytes(path)
+        if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+            self.fail(1, "is UTF-16 text", allowed="UTF-8 or Latin-1")
+        zero = content.find(b"\0")
+        if zero >= 0:
+            self.fail(content.count(b"\n", 0, zero) + 1, "is no text: holds a zero byte")
         try:
-            values = np.fromstring(" ".join(rows), dtype=np.float64, sep=" ")
-        except (ValueError, DeprecationWarning):
-            values = np.zeros(0)
-    if values.size == len(rows) * columns and np.isfinite(values).all():
-        widths = {len(row.split()) for row in (rows[0], rows[len(rows) // 2], rows[-1])}
-        if widths == {columns}:
-            return values.reshape(len(rows), columns)
-    return _rows_one_by_one(lines, line_numbers, columns, path)
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+        self.lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+    def fail(self, line: int, what: str, got: object = None, allowed: str | None = None) -> NoReturn:
+        """Raise a `MotionError` about a line, counted from 1."""
+        shown = got[:60] if isinstance(got, str) else got
+        raise MotionError(describe(f"{self.path}:{line}", what, shown, allowed))
+
+    def number(self, token: str, line: int, what: str) -> float:
+        """Value of a token that must be a finite number."""
+        try:
+            value = float(token) if token.isascii() and "_" not in token else math.nan
+        except ValueError:
+            self.fail(line, f"{what} must be a number", token)
+        if not abs(value) <= MAXIMUM_NUMBER:
+            self.fail(line, f"{what} must be a finite number", token)
+        return value
+
+    def integer(self, token: str, line: int, what: str) -> int:
+        """Value of a token that must be an integer that is not negative."""
+        if not _INTEGER.fullmatch(token) or int(token) < 0:
+            self.fail(line, f"{what} must be a count", token)
+        return int(token)
+
+    def table(self, rows: Sequence[str], lines: Sequence[int], width: int, what: str) -> FloatArray:
+        """Rows of `width` numbers each; `lines` are their line numbers, `what` names one row.
+
+        Returns
+        -------
+        (rows, width) float64
+        """
+        try:
+            values = np.loadtxt(rows, np.float64, comments=None, ndmin=2)
+        except ValueError:
+            values = np.empty((0, 0))
+        if values.shape == (len(rows), width) and bool((np.abs(values) <= MAXIMUM_NUMBER).all()):
+            return values
+        for row, line in zip(rows, lines, strict=True):
+            tokens = row.split()
+            for token in tokens:
+                self.number(token, line, f"each value of {what}")
+            if len(tokens) != width:
+                self.fail(line, f"{what} must hold {width} numbers", len(tokens))
+        self.fail(lines[0], f"{what} cannot be read")
 
 
-def _rows_one_by_one(
-    lines: Sequence[str], line_numbers: Sequence[int], columns: int, path: Path
-) -> FloatArray:
-    found = []
-    for line_number, line in zip(line_numbers, lines, strict=True):
-        tokens = line.split()
-        if not tokens:
-            continue
-        if len(tokens) != columns:
-            raise MotionError(
-                describe(at_line(path, line_number), "wrong count of numbers", len(tokens), str(columns))
-            )
-        found.append([number(token, path, line_number, "value") for token in tokens])
-    return np.array(found, np.float64)
+class Tokens:
+    """Tokens of a text file in order, one ahead.
+
+    Attributes
+    ----------
+    line : int
+        Line of the token taken last, from 1.
+    """
+
+    def __init__(self, text: TextFile, pattern: re.Pattern[str] = WORD, comment: str | None = None) -> None:
+        self.text = text
+        self.line = 1
+        self._pattern = pattern
+        self._comment = comment
+        self._stream = self._scan()
+        self._next = next(self._stream, None)
+
+    def _scan(self) -> Iterator[tuple[str, int]]:
+        for number, line in enumerate(self.text.lines, 1):
+            content = line if self._comment is None else line.partition(self._comment)[0]
+            for token in self._pattern.findall(content):
+                yield token, number
+
+    def peek(self) -> str | None:
+        """Next token, not taken; None at the end."""
+        return None if self._next is None else self._next[0]
+
+    def next_line(self) -> int:
+        """Line of the next token; that of the last at the end."""
+        return self.line if self._next is None else self._next[1]
+
+    def take(self, what: str) -> str:
+        """Take the next token; `what` says what should stand there."""
+        if self._next is None:
+            self.text.fail(len(self.text.lines), f"ends where {what} should follow")
+        token, self.line = self._next
+        self._next = next(self._stream, None)
+        return token
+
+    def take_number(self, what: str) -> float:
+        """Take a finite number."""
+        token = self.take(what)
+        return self.text.number(token, self.line, what)
+
+    def take_numbers(self, count: int, what: str) -> tuple[float, ...]:
+        """Take finite numbers."""
+        return tuple(self.take_number(what) for _ in range(count))
+
+    def take_integer(self, what: str) -> int:
+        """Take a count."""
+        token = self.take(what)
+        return self.text.integer(token, self.line, what)
+
+    def take_name(self, what: str) -> str:
+        """Take everything up to an opening brace, and the brace."""
+        words: list[str] = []
+        while True:
+            token = self.take(what)
+            if token == "{":
+                break
+            if token == "}":
+                self.fail(f"{what} should stand here", token)
+            words.append(token)
+        if not words:
+            self.fail(f"{what} is missing")
+        return " ".join(words).strip('"')
+
+    def fail(self, what: str, got: object = None, allowed: str | None = None) -> NoReturn:
+        """Raise a `MotionError` about the line of the last token."""
+        self.text.fail(self.line, what, got, allowed)
