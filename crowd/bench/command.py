@@ -105,12 +105,17 @@ def kernels(
 @app.command()
 def sweep(
     points: Annotated[int, typer.Option(min=50, help="Points of the locomotion space.")] = 300,
+    motions: Annotated[
+        Path | None, typer.Option(help="Motion library made by `crowd motions import`.")
+    ] = None,
 ) -> int:
     """Realised against commanded motion over the locomotion space, and joint pops at changes of motion."""
     from crowd.bench.sweep import sweep as run_sweep
     from crowd.bench.sweep import transitions
+    from crowd.motion.library_file import load_library
 
-    result = run_sweep(points)
+    library = None if motions is None else load_library(motions)
+    result = run_sweep(points, library)
     print(f"points {result.points}, stances {result.stances}")
     print(f"speed rms relative    {result.speed_rms_relative:.5f}")
     print(f"turn rms deg/s        {result.turn_rms_deg_s:.4f}")
@@ -118,7 +123,7 @@ def sweep(
     print(f"stance drift 95 % m   {result.drift_p95_m:.6f}")
     print(f"stance drift max m    {result.drift_max_m:.6f}")
     print(f"largest weight jump   {result.largest_weight_jump:.2e}")
-    changes = transitions()
+    changes = transitions(library)
     print(f"largest joint acceleration of the examples: {changes.examples:.0f} rad/s^2")
     for name, value in changes.manoeuvres.items():
         print(f"  {name:24s} {value:6.0f} rad/s^2, {value / changes.examples:.2f} times")

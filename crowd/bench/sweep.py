@@ -80,7 +80,8 @@ def lone_people(count: int) -> Scenario:
 def sweep(count: int = 300, motions: MotionLibrary | None = None) -> SweepResult:
     """Command constant parameters to many people and compare what their pelvis does over whole cycles.
 
-    The pelvis, not the root, is followed, so that the figure includes all that layers and foot locks do.
+    The pelvis is followed, so that the figure includes all that layers and foot locks do. Where it circles
+    about the root, because somebody turns about a point beside it, the circling does not count as travel.
     """
     simulation = Simulation(lone_people(1), motions=motions)
     asked = sweep_points(simulation.model.space, count)
@@ -98,16 +99,14 @@ def sweep(count: int = 300, motions: MotionLibrary | None = None) -> SweepResult
     begin, path, turn = simulation.time, np.zeros((len(asked), 2)), np.zeros(len(asked))
     is_measured = np.zeros(len(asked), bool)
     speed, rate = np.zeros(len(asked)), np.zeros(len(asked))
-    pelvis, yaw = simulation.joint_positions_world()[:, 0], state.yaw.copy()
+    root, yaw = state.position_world.copy(), state.yaw.copy()
+    aside = ahead_and_left(simulation.joint_positions_world()[:, 0] - root, yaw)
     for frame in simulation.run(seconds=float(cycles.max()) + 0.1):
-        now = simulation.joint_positions_world()[:, 0]
-        middle = yaw + 0.5 * np.angle(np.exp(1j * (state.yaw - yaw)))
-        step = now - pelvis
-        forward = step[:, 0] * np.sin(middle) + step[:, 2] * np.cos(middle)
-        side = step[:, 0] * np.cos(middle) - step[:, 2] * np.sin(middle)
-        path += np.stack([forward, side], axis=1)
-        turn += np.angle(np.exp(1j * (state.yaw - yaw)))
-        pelvis, yaw = now, state.yaw.copy()
+        turned = np.angle(np.exp(1j * (state.yaw - yaw)))
+        now_aside = ahead_and_left(simulation.joint_positions_world()[:, 0] - state.position_world, state.yaw)
+        path += ahead_and_left(state.position_world - root, yaw + 0.5 * turned) + now_aside - aside
+        turn += turned
+        root, yaw, aside = state.position_world.copy(), state.yaw.copy(), now_aside
         is_due = ~is_measured & (frame.time - begin >= cycles)
         elapsed = frame.time - begin
         speed[is_due] = np.hypot(*path[is_due].T) / elapsed
@@ -127,6 +126,12 @@ def sweep(count: int = 300, motions: MotionLibrary | None = None) -> SweepResult
         int(drift["foot_slip.stances"]),
         largest_weight_jump(simulation.model.space),
     )
+
+
+def ahead_and_left(way: FloatArray, yaw: FloatArray) -> FloatArray:
+    """Components (N, 2) ahead and to the left of ways (N, 3) for people who face along `yaw` (N,)."""
+    sine, cosine = np.sin(yaw), np.cos(yaw)
+    return np.stack([way[:, 0] * sine + way[:, 2] * cosine, way[:, 0] * cosine - way[:, 2] * sine], axis=1)
 
 
 def observe(simulation: Simulation, time: float) -> Observation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 LEAST_WIDTH = 170
 """Columns of a table, also where the terminal has fewer."""
+
+Parameters = tuple[float, float, float]
 
 app = typer.Typer(
     help="Import captured motion into a library, and show what a library holds.",
@@ -146,7 +149,8 @@ def print_report(report: ImportReport) -> None:
     mended = [(entry.clip.name, entry.popped) for entry in report.imported if entry.popped]
     for clip, frames in mended:
         print(f"{clip}: {frames} frames popped and were mended")
-    print_clips([entry.clip for entry in report.imported])
+    captured = {entry.clip.name: entry.captured for entry in report.imported}
+    print_clips([entry.clip for entry in report.imported], captured)
     for twin, kept in report.examples.duplicates:
         print(f"{twin}: same parameters as {kept}, left out of the examples")
     print_coverage(report.examples.coverage)
@@ -154,8 +158,17 @@ def print_report(report: ImportReport) -> None:
         print(f"not usable: {file}: {reason}")
 
 
-def print_clips(clips: list[Clip] | tuple[Clip, ...]) -> None:
-    """Print the table of clips: what they serve, parameters, quality."""
+def print_clips(
+    clips: list[Clip] | tuple[Clip, ...], captured: Mapping[str, Parameters | None] | None = None
+) -> None:
+    """Print the table of clips: what they serve, parameters, quality.
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+    captured : mapping, optional
+        Forward m/s, turn rad/s and side m/s in the size of the source, by clip; a column more.
+    """
     from rich import box
     from rich.table import Table
 
@@ -164,6 +177,8 @@ def print_clips(clips: list[Clip] | tuple[Clip, ...]) -> None:
     table.add_column("serves")
     for heading in ("s", "forward m/s", "turn deg/s", "side m/s", "drift cm", "loop deg", "flight m/s2"):
         table.add_column(heading, justify="right")
+    if captured is not None:
+        table.add_column("as captured", justify="right")
     table.add_column("labels")
     for clip in clips:
         forward, turn, side = clip.parameters
@@ -177,9 +192,17 @@ def print_clips(clips: list[Clip] | tuple[Clip, ...]) -> None:
             "" if quality is None else f"{100 * quality.stance_drift:.1f}",
             "" if quality is None or not moves else f"{math.degrees(quality.seam):.1f}",
             "" if quality is None or not quality.flight_gravity else f"{quality.flight_gravity:.1f}",
+            *(() if captured is None else (_captured_in_words(captured.get(clip.name)),)),
             labels_in_words(clip),
         )
     print_wide(table)
+
+
+def _captured_in_words(parameters: Parameters | None) -> str:
+    if parameters is None:
+        return ""
+    forward, turn, side = parameters
+    return f"{forward:.3f} m/s, {math.degrees(turn):.1f} deg/s, {side:.3f} m/s"
 
 
 def print_wide(table: Table) -> None:

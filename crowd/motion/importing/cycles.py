@@ -259,8 +259,7 @@ def cyclic_clip(name: str, motion: Retargeted, skeleton: Skeleton, window: Windo
     place = (window.begin + np.linspace(0.0, duration, intervals + 1)) * motion.frame_rate
     rotation = sample(motion.rotation_local, place)
     pelvis = sample_linear(motion.pelvis, place)
-    travel = sample_linear(motion.travel, place)
-    root = steady_root(travel, heading_of(rotation[:, 0]), duration, window.cycles)
+    root = steady_root(pelvis, heading_of(rotation[:, 0]), duration, window.cycles)
     back = about(1, -root.yaw)
     rotation[:, 0] = multiply(back, rotation[:, 0])
     pelvis = rotate(back, pelvis - root.position)
@@ -286,6 +285,16 @@ def cyclic_clip(name: str, motion: Retargeted, skeleton: Skeleton, window: Windo
         parameters=root.parameters,
         cycles=2,
     )
+
+
+def captured_parameters(motion: Retargeted, window: Window) -> tuple[float, float, float]:
+    """Forward m/s, turn rad/s and side m/s of the source's own pelvis joint, in the size of the source."""
+    ends = np.array([window.begin, window.end]) * motion.frame_rate
+    place = np.linspace(ends[0], ends[1], max(round(ends[1] - ends[0]), 8) + 1)
+    heading = heading_of(sample(motion.rotation_local[:, :1], place)[:, 0])
+    travel = sample_linear(motion.travel, place)
+    forward, turn, side = steady_root(travel, heading, window.end - window.begin, window.cycles).parameters
+    return forward / motion.scale, turn, side / motion.scale
 
 
 def cycle_events(window: Window, repeats: int) -> tuple[tuple[float, FootEvent], ...]:

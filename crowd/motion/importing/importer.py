@@ -16,7 +16,16 @@ from crowd.motion.importing.axes import PosedSource, convert, find_convention
 from crowd.motion.importing.classify import jump_labels, kind_of, look_at, reach_labels
 from crowd.motion.importing.clips import facing_of_feet, plain_clip, stance_drift
 from crowd.motion.importing.contacts import Contacts, Stance, find_contacts, find_stances, sole_heights
-from crowd.motion.importing.cycles import cyclic_clip, find_window, heading_of, is_loop, sample, sample_linear
+from crowd.motion.importing.cycles import (
+    Window,
+    captured_parameters,
+    cyclic_clip,
+    find_window,
+    heading_of,
+    is_loop,
+    sample,
+    sample_linear,
+)
 from crowd.motion.importing.joint_names import JointMap, map_joints, read_mapping
 from crowd.motion.importing.labels import Correction
 from crowd.motion.importing.retarget import Retargeted, retarget
@@ -74,6 +83,8 @@ class Imported:
         Source joints that have no counterpart.
     popped : int
         Frames that were mended.
+    captured : (float, float, float) or None
+        Forward m/s, turn rad/s and side m/s in the size of the source; of gaits.
     """
 
     clip: Clip
@@ -82,6 +93,7 @@ class Imported:
     scale: float
     unused_joints: tuple[str, ...]
     popped: int
+    captured: tuple[float, float, float] | None
 
 
 def import_clip(
@@ -124,12 +136,13 @@ def import_clip(
         contacts = find_contacts(source, joints, is_loop=True)
     stances = told_stances(motion, told, source) or find_stances(contacts, source.frame_rate)
     tags = dict(motion.tags)
-    clip = make_clip(motion.name, moved, contacts, stances, skeleton, told, tags, loops)
+    clip, window = make_clip(motion.name, moved, contacts, stances, skeleton, told, tags, loops)
+    captured = None if window is None else captured_parameters(moved, window)
     clip = corrected(clip, told, moved.scale, motion)
     drift = stance_drift(clip, skeleton) if clip.foot_events else 0.0
     quality = replace(clip.quality or ClipQuality(), stance_drift=drift)
     clip = replace(clip, quality=quality, source=motion.path.name)
-    return Imported(clip, joints.family, convention.text, moved.scale, joints.unused, popped)
+    return Imported(clip, joints.family, convention.text, moved.scale, joints.unused, popped, captured)
 
 
 def make_clip(
@@ -141,8 +154,8 @@ def make_clip(
     told: Correction,
     tags: Mapping[str, float],
     loops: bool,
-) -> Clip:
-    """Decide what a motion serves, and make that clip with its labels."""
+) -> tuple[Clip, Window | None]:
+    """Decide what a motion serves, and make that clip with its labels; also gives the cycles of a gait."""
     motions = look_at(motion, contacts, skeleton)
     is_gait = not (motions.stands_first or motions.stands_last)
     wants_gait = told.kind is ClipKind.LOCOMOTION
@@ -159,7 +172,7 @@ def make_clip(
                 )
             )
         clip = cyclic_clip(name, motion, skeleton, window)
-        return replace(clip, quality=ClipQuality(seam=window.seam))
+        return replace(clip, quality=ClipQuality(seam=window.seam)), window
     clip = plain_clip(name, kind, motion, skeleton, stances, motions.stands_first)
     headings = heading_of(motion.rotation_local[:1, 0])
     yaw = float((facing_of_feet(motion, skeleton) if motions.stands_first else headings)[0])
@@ -170,7 +183,7 @@ def make_clip(
         clip = replace(clip, jump=jump, quality=ClipQuality(flight_gravity=motions.flight_gravity))
     if kind is ClipKind.REACH:
         clip = replace(clip, reach=reach_labels(motion, motions, skeleton, dict(tags), yaw))
-    return clip
+    return clip, None
 
 
 def resampled(source: PosedSource) -> PosedSource:
