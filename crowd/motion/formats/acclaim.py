@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import MotionError, describe, nearest_first
-from crowd.motion.formats.euler import from_euler
-from crowd.motion.formats.text import at_line, number, read_rows, read_text
+from crowd.motion.formats.euler import compose
+from crowd.motion.formats.text import TextFile, at_line, number
 from crowd.motion.rotation import conjugate, multiply
 from crowd.motion.source import SourceMotion, SourceSkeleton
 
@@ -69,7 +69,7 @@ def read_asf(path: Path) -> AcclaimSkeleton:
     skeleton = AcclaimSkeleton(path)
     skeleton.bones["root"] = _Bone("root", 1, freedom=("tx", "ty", "tz", "rx", "ry", "rz"))
     section, bone = "", None
-    lines = read_text(path).splitlines()
+    lines = TextFile(path).lines
     for index, text in enumerate(lines):
         line = index + 1
         tokens = text.split("#")[0].split()
@@ -246,8 +246,8 @@ def read_amc(path: Path, skeleton_path: Path, frame_rate: float | None = None) -
         turns = [k for k, kind in enumerate(bone.freedom) if kind[0] == "r"]
         if turns:
             # Applied in listed order about fixed axes: the last listed is the outermost.
-            axes = "".join(bone.freedom[k][1].upper() for k in turns)[::-1]
-            own = from_euler(part[:, turns[::-1]] * asf.radians, axes)
+            axes = tuple("xyz".index(bone.freedom[k][1]) for k in turns[::-1])
+            own = compose(axes, part[:, turns[::-1]] * asf.radians)
             frame = _axis_rotation(bone, asf.radians)
             rotation[:, place[name]] = multiply(multiply(frame, own), conjugate(frame))
         for k, kind in enumerate(bone.freedom):
@@ -258,8 +258,8 @@ def read_amc(path: Path, skeleton_path: Path, frame_rate: float | None = None) -
 
 
 def _axis_rotation(bone: _Bone, radians: float) -> FloatArray:
-    angles = np.array([bone.axis["XYZ".index(axis)] for axis in bone.axis_order[::-1]]) * radians
-    return from_euler(angles, bone.axis_order[::-1])
+    axes = tuple("XYZ".index(axis) for axis in bone.axis_order[::-1])
+    return compose(axes, radians * np.array([bone.axis[axis] for axis in axes]))
 
 
 def _as_joints(asf: AcclaimSkeleton) -> SourceSkeleton:
@@ -297,7 +297,8 @@ def _read_frames(path: Path, asf: AcclaimSkeleton) -> tuple[list[str], FloatArra
     at = 0
     expected = 1
     began = False
-    lines = read_text(path).splitlines()
+    source = TextFile(path)
+    lines = source.lines
     for index, text in enumerate(lines):
         if text.startswith(("#", ":")) or not text.strip():
             continue
@@ -324,7 +325,7 @@ def _read_frames(path: Path, asf: AcclaimSkeleton) -> tuple[list[str], FloatArra
         row.append(rest)
         at += 1
         freedom = len(asf.bones[name].freedom)
-        if rest.count(" ") + 1 < freedom:
+        if len(rest.split()) != freedom:
             raise MotionError(
                 describe(at_line(path, index + 1), "wrong count of numbers", rest, f"{freedom} numbers")
             )
@@ -332,7 +333,7 @@ def _read_frames(path: Path, asf: AcclaimSkeleton) -> tuple[list[str], FloatArra
         raise MotionError(describe(at_line(path, len(lines)), "there are no frames"))
     _close_frame(path, len(lines), names, at, row, numbers)
     width = sum(len(asf.bones[name].freedom) for name in names)
-    return names, read_rows(numbers, starts, width, path), len(numbers)
+    return names, source.table(numbers, starts, width, "a frame"), len(numbers)
 
 
 def _check_bone(path: Path, line: int, asf: AcclaimSkeleton, name: str, names: list[str]) -> None:

@@ -33,6 +33,22 @@ def read_bytes(path: Path) -> bytes:
         raise MotionError(describe(str(path), f"cannot be read ({error.strerror})")) from error
 
 
+def at_line(path: Path, line: int) -> str:
+    """Where something is, for a message; lines count from 1."""
+    return f"{path}:{line}"
+
+
+def number(token: str, path: Path, line: int, what: str) -> float:
+    """Value of a token that must be a finite number of sensible size."""
+    try:
+        value = float(token) if token.isascii() and "_" not in token else math.nan
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= MAXIMUM_NUMBER:
+        raise MotionError(describe(at_line(path, line), f"{what} must be a finite number", token[:60]))
+    return value
+
+
 class TextFile:
     """A text file, by lines.
 
@@ -60,17 +76,11 @@ class TextFile:
     def fail(self, line: int, what: str, got: object = None, allowed: str | None = None) -> NoReturn:
         """Raise a `MotionError` about a line, counted from 1."""
         shown = got[:60] if isinstance(got, str) else got
-        raise MotionError(describe(f"{self.path}:{line}", what, shown, allowed))
+        raise MotionError(describe(at_line(self.path, line), what, shown, allowed))
 
     def number(self, token: str, line: int, what: str) -> float:
         """Value of a token that must be a finite number."""
-        try:
-            value = float(token) if token.isascii() and "_" not in token else math.nan
-        except ValueError:
-            self.fail(line, f"{what} must be a number", token)
-        if not abs(value) <= MAXIMUM_NUMBER:
-            self.fail(line, f"{what} must be a finite number", token)
-        return value
+        return number(token, self.path, line, what)
 
     def integer(self, token: str, line: int, what: str) -> int:
         """Value of a token that must be an integer that is not negative."""
@@ -89,8 +99,12 @@ class TextFile:
             values = np.loadtxt(rows, np.float64, comments=None, ndmin=2)
         except ValueError:
             values = np.empty((0, 0))
-        if values.shape == (len(rows), width) and bool((np.abs(values) <= MAXIMUM_NUMBER).all()):
-            return values
+        is_sound = values.shape == (len(rows), width) and bool((np.abs(values) <= MAXIMUM_NUMBER).all())
+        if not is_sound:
+            self._fail_at_row(rows, lines, width, what)
+        return values
+
+    def _fail_at_row(self, rows: Sequence[str], lines: Sequence[int], width: int, what: str) -> NoReturn:
         for row, line in zip(rows, lines, strict=True):
             tokens = row.split()
             for token in tokens:
