@@ -1,0 +1,6 @@
+"""Characters that users bring: skinned glTF people and creatures, driven by the crowd."""
+
+from crowd.characters.character import Character, MeshPart, load_character
+from crowd.characters.driving import Driver
+
+__all__ = ["Character", "Driver", "MeshPart", "load_character"]
