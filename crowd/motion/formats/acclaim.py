@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import MotionError, describe, nearest_first
 from crowd.motion.formats.euler import compose
-from crowd.motion.formats.text import TextFile, at_line, number
+from crowd.motion.formats.joint_list import IDENTITY, JointList, check_size, rest_positions
+from crowd.motion.formats.text import MAXIMUM_NUMBER, TextFile, at_line, number
 from crowd.motion.rotation import conjugate, multiply
 from crowd.motion.source import SourceMotion, SourceSkeleton
 
@@ -20,6 +22,9 @@ FloatArray = npt.NDArray[np.float64]
 USUAL_RATE = 120.0
 """AMC files state no rate; CMU and HDM05 captured at this one, Hz."""
 INCH = 0.0254
+_HEADER_LINES = 20
+_BLOCK = 256
+"""Frames whose numbers are read at once."""
 DEGREES_OF_FREEDOM = ("rx", "ry", "rz", "tx", "ty", "tz", "l")
 
 
@@ -33,6 +38,10 @@ class _Bone:
     axis_order: str = "XYZ"
     freedom: tuple[str, ...] = ()
     parent: str = ""
+
+    def end(self) -> tuple[float, ...]:
+        """From the start of the bone to its end."""
+        return tuple(self.length * part for part in self.direction)
 
 
 @dataclass
@@ -195,20 +204,18 @@ def _read_children(skeleton: AcclaimSkeleton, tokens: list[str], line: int) -> N
 
 def _sort_bones(skeleton: AcclaimSkeleton) -> None:
     """Order bones so that parents come first."""
-    ordered = {"root": skeleton.bones["root"]}
-    waiting = {name: bone for name, bone in skeleton.bones.items() if name != "root"}
-    while waiting:
-        ready = [name for name, bone in waiting.items() if bone.parent in ordered]
-        if not ready:
-            name, bone = next(iter(waiting.items()))
-            raise MotionError(
-                describe(at_line(skeleton.path, bone.line), "bone does not hang on the root", name)
-            )
-        for name in ready:
-            ordered[name] = waiting.pop(name)
-    if not any(bone.length > 0.0 for bone in ordered.values()):
-        raise MotionError(describe(str(skeleton.path), "all bones have zero length"))
-    skeleton.bones = ordered
+    children: dict[str, list[str]] = {}
+    for name, bone in skeleton.bones.items():
+        children.setdefault(bone.parent, []).append(name)
+    order = ["root"]
+    for name in order:
+        order += children.get(name, [])
+    loose = sorted(set(skeleton.bones).difference(order), key=lambda name: skeleton.bones[name].line)
+    if loose:
+        line = skeleton.bones[loose[0]].line
+        what = "bone does not hang on the root: it has no parent, or is its own ancestor"
+        raise MotionError(describe(at_line(skeleton.path, line), what, loose[0]))
+    skeleton.bones = {name: skeleton.bones[name] for name in order}
 
 
 def read_amc(path: Path, skeleton_path: Path, frame_rate: float | None = None) -> SourceMotion:
@@ -231,12 +238,12 @@ def read_amc(path: Path, skeleton_path: Path, frame_rate: float | None = None) -
     child's offset is the bone before it. Euler angles apply in listed order about fixed axes.
     """
     asf = read_asf(skeleton_path)
-    names, values, frames = _read_frames(path, asf)
     skeleton = _as_joints(asf)
-    count = skeleton.joint_count
-    rotation = np.zeros((frames, count, 4))
-    rotation[..., 0] = 1.0
-    position = np.broadcast_to(skeleton.offset, (frames, count, 3)).copy()
+    names, values = _read_frames(path, asf)
+    check_size(path, len(values), skeleton.joint_count)
+    rotation = np.empty((len(values), skeleton.joint_count, 4))
+    rotation[:] = IDENTITY
+    position = rest_positions(skeleton, len(values))
     place = {name: index for index, name in enumerate(skeleton.joint_names)}
     column = 0
     for name in names:
@@ -264,91 +271,105 @@ def _axis_rotation(bone: _Bone, radians: float) -> FloatArray:
 
 def _as_joints(asf: AcclaimSkeleton) -> SourceSkeleton:
     """One joint at the start of each bone, and one at the end of each bone without children."""
-    bones = list(asf.bones.values())
-    place = {bone.name: index for index, bone in enumerate(bones)}
-    names = [bone.name for bone in bones]
-    parent = [-1 if bone.name == "root" else place[bone.parent] for bone in bones]
-    offset = [
-        asf.position
-        if bone.name == "root"
-        else np.array(asf.bones[bone.parent].direction) * asf.bones[bone.parent].length
-        for bone in bones
-    ]
-    with_children = {bone.parent for bone in bones}
-    for bone in bones:
-        if bone.name not in with_children and bone.name != "root":
-            names.append(f"{bone.name}_end")
-            parent.append(place[bone.name])
-            offset.append(np.array(bone.direction) * bone.length)
-    animated = [any(kind[0] == "r" for kind in bone.freedom) for bone in bones]
-    animated += [False] * (len(names) - len(bones))
-    still = np.tile([1.0, 0.0, 0.0, 0.0], (len(names), 1))
-    return SourceSkeleton(
-        tuple(names), np.array(parent, np.int32), np.array(offset), still, np.array(animated)
-    )
+
+    def fail(line: int, what: str, got: object) -> NoReturn:
+        raise MotionError(describe(at_line(asf.path, line), what, got))
+
+    joints = JointList(fail)
+    place = {"": -1}
+    for name, bone in asf.bones.items():
+        place[name] = joints.add(name, place[bone.parent], bone.line)
+        above = asf.bones.get(bone.parent)
+        joints.offset[-1] = tuple(asf.position) if above is None else above.end()
+        joints.is_animated[-1] = any(kind[0] == "r" for kind in bone.freedom)
+    with_children = {bone.parent for bone in asf.bones.values()}
+    for name, bone in asf.bones.items():
+        if name not in with_children:
+            joints.add_end(place[name], bone.line)
+            joints.offset[-1] = bone.end()
+    return joints.build(asf.bones["root"].line)
 
 
-def _read_frames(path: Path, asf: AcclaimSkeleton) -> tuple[list[str], FloatArray, int]:
-    """Bones in the order of the frames, their values (frames, columns), and the number of frames."""
-    names: list[str] = []
-    numbers: list[str] = []
-    starts: list[int] = []
-    row: list[str] = []
-    at = 0
-    expected = 1
-    began = False
+def _read_frames(path: Path, asf: AcclaimSkeleton) -> tuple[list[str], FloatArray]:
+    """Bones in the order of the frames, and their values (frames, columns)."""
     source = TextFile(path)
-    lines = source.lines
-    for index, text in enumerate(lines):
-        if text.startswith(("#", ":")) or not text.strip():
+    lines = [line for line, text in enumerate(source.lines, 1) if text.strip() and text[0] not in "#:"]
+    texts = [source.lines[line - 1] for line in lines]
+    if any(text.strip().lower() == ":radians" for text in source.lines[:_HEADER_LINES]):
+        asf.radians = 1.0
+    if not texts:
+        source.fail(len(source.lines), "holds no frames")
+    if not texts[0].strip().isdigit():
+        source.fail(lines[0], "the number of a frame should stand here", texts[0].strip())
+    first = source.integer(texts[0].strip(), lines[0], "a frame")
+    end = next((at for at in range(1, len(texts)) if texts[at].strip().isdigit()), len(texts))
+    names = _first_bones(source, asf, list(zip(lines[1:end], texts[1:end], strict=True)))
+    widths = [len(asf.bones[name].freedom) for name in names]
+    check_size(path, len(texts) / end, len(asf.bones))
+    blocks: list[FloatArray] = []
+    for at in range(0, len(texts), _BLOCK * end):
+        block = slice(at, at + _BLOCK * end)
+        values = _read_block(" ".join(texts[block]).split(), first + at // end, names, widths)
+        if values is None:
+            _fail_in_block(source, lines[block], first + at // end, names, widths)
+        blocks.append(values)
+    return names, np.concatenate(blocks)
+
+
+def _read_block(tokens: list[str], first: int, names: list[str], widths: list[int]) -> FloatArray | None:
+    """Values of frames of which the first has a number; None when anything is wrong."""
+    period = 1 + len(names) + sum(widths)
+    count = len(tokens) // period
+    expected = [str(first + frame) for frame in range(count)]
+    if not count or len(tokens) % period or tokens[::period] != expected:
+        return None
+    is_value = np.ones(period, bool)
+    is_value[0] = False
+    place = 1
+    for name, width in zip(names, widths, strict=True):
+        if tokens[place::period].count(name) != count:
+            return None
+        tokens[place::period] = ["0"] * count
+        is_value[place] = False
+        place += 1 + width
+    try:
+        values = np.fromiter(map(float, tokens), np.float64, len(tokens)).reshape(count, period)
+    except ValueError:
+        return None
+    values = values[:, is_value]
+    return values if bool((np.abs(values) <= MAXIMUM_NUMBER).all()) else None
+
+
+def _first_bones(source: TextFile, asf: AcclaimSkeleton, body: list[tuple[int, str]]) -> list[str]:
+    """Names of the bones in the first frame; all others must list the same."""
+    names: list[str] = []
+    for line, text in body:
+        name = text.split()[0]
+        if name not in asf.bones:
+            source.fail(line, "the skeleton has no such bone", name, nearest_first(name, asf.bones))
+        if name in names:
+            source.fail(line, "a bone stands twice in a frame", name)
+        names.append(name)
+    if not any(asf.bones[name].freedom for name in names):
+        source.fail(len(source.lines) if not body else body[0][0], "a frame holds no bones that move")
+    return names
+
+
+def _fail_in_block(
+    source: TextFile, lines: list[int], first: int, names: list[str], widths: list[int]
+) -> NoReturn:
+    """Say which line of some frames is wrong."""
+    for at, line in enumerate(lines):
+        frame, bone = first + at // (1 + len(names)), at % (1 + len(names)) - 1
+        tokens = source.lines[line - 1].split()
+        if bone < 0:
+            if tokens != [str(frame)]:
+                source.fail(line, f"the number of frame {frame} should stand here", " ".join(tokens))
             continue
-        name, _, rest = text.strip().partition(" ")
-        if not rest and name.isdigit():
-            if began:
-                _close_frame(path, index, names, at, row, numbers)
-            if int(name) != expected and expected > 1:
-                raise MotionError(describe(at_line(path, index + 1), "frame is missing", name, str(expected)))
-            expected = int(name) + 1
-            began, at, row = True, 0, []
-            starts.append(index + 1)
-            continue
-        if not began:
-            raise MotionError(
-                describe(at_line(path, index + 1), "is no AMC file", text[:40], "a frame number")
-            )
-        if len(numbers) == 0:
-            names.append(name)
-            _check_bone(path, index + 1, asf, name, names)
-        elif at >= len(names) or names[at] != name:
-            wanted = names[at] if at < len(names) else "a frame number"
-            raise MotionError(describe(at_line(path, index + 1), "bone is out of order", name[:40], wanted))
-        row.append(rest)
-        at += 1
-        freedom = len(asf.bones[name].freedom)
-        if len(rest.split()) != freedom:
-            raise MotionError(
-                describe(at_line(path, index + 1), "wrong count of numbers", rest, f"{freedom} numbers")
-            )
-    if not began:
-        raise MotionError(describe(at_line(path, len(lines)), "there are no frames"))
-    _close_frame(path, len(lines), names, at, row, numbers)
-    width = sum(len(asf.bones[name].freedom) for name in names)
-    return names, source.table(numbers, starts, width, "a frame"), len(numbers)
-
-
-def _check_bone(path: Path, line: int, asf: AcclaimSkeleton, name: str, names: list[str]) -> None:
-    if name not in asf.bones:
-        known = nearest_first(name, asf.bones)
-        raise MotionError(describe(at_line(path, line), "the skeleton has no such bone", name[:40], known))
-    if names.count(name) > 1:
-        raise MotionError(describe(at_line(path, line), "bone comes twice in a frame", name))
-
-
-def _close_frame(
-    path: Path, line: int, names: list[str], at: int, row: list[str], numbers: list[str]
-) -> None:
-    if at != len(names) or not names:
-        raise MotionError(
-            describe(at_line(path, line), "frame ends too soon", f"{at} bones", f"{len(names)}")
-        )
-    numbers.append(" ".join(row))
+        if tokens[0] != names[bone]:
+            source.fail(line, "another bone should stand here", tokens[0], names[bone])
+        for token in tokens[1:]:
+            source.number(token, line, f"each value of {names[bone]}")
+        if len(tokens) != 1 + widths[bone]:
+            source.fail(line, f"{names[bone]} has {widths[bone]} values", len(tokens) - 1)
+    source.fail(lines[-1], f"ends within frame {first + len(lines) // (1 + len(names))}")

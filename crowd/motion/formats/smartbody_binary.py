@@ -35,10 +35,7 @@ class Message:
 
     def all_floats(self, number: int) -> FloatArray:
         """Values of a repeated field, one by one or packed."""
-        packed = [
-            np.frombuffer(content[: len(content) // 4 * 4], "<f4").astype(np.float64)
-            for content in self.strings.get(number, [])
-        ]
+        packed = [_as_floats(content[: len(content) // 4 * 4]) for content in self.strings.get(number, [])]
         return np.concatenate([np.empty(0), *self.floats.get(number, []), *packed])
 
 
@@ -115,6 +112,11 @@ def _tags(path: Path, message: Message) -> tuple[tuple[str, float], ...]:
     return tuple((name, time) for name, time in named if 0.0 <= time <= MAXIMUM_NUMBER)
 
 
+def _as_floats(content: bytes) -> FloatArray:
+    with np.errstate(invalid="ignore"):  # Some bytes are no numbers; these are found later.
+        return np.frombuffer(content, "<f4").astype(np.float64)
+
+
 class _Parser:
     """Splits a message into fields."""
 
@@ -182,4 +184,4 @@ class _Parser:
             looked *= 2
         self.at = start + size * count
         rows = np.frombuffer(self.content[start : self.at], np.uint8).reshape(-1, size)
-        return np.ascontiguousarray(rows[:, len(key) :]).view("<f4")[:, 0].astype(np.float64)
+        return _as_floats(rows[:, len(key) :].tobytes())
