@@ -1,0 +1,287 @@
+"""People: chosen by what the camera sees, packed, uploaded, and drawn as meshes and capsules."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd_kernels.view import REACH, levels_crowd, pack_crowd, sort_rows
+from crowd_viewer.bodies import (
+    flesh_segments,
+    joint_parts,
+    landmarks,
+    rest_positions,
+    simple_limbs,
+)
+from crowd_viewer.frame import CrowdFrame, Scene
+from crowd_viewer.looks import LOOK_COLUMNS, draw_looks
+from crowd_viewer.programs import compile_program
+from crowd_viewer.quality import Quality
+from crowd_viewer.tables import Table
+
+if TYPE_CHECKING:
+    import moderngl
+
+FloatArray = npt.NDArray[np.float64]
+MESH_LEVELS = 3
+LEVELS = 5
+FEW_LIMBS = 13
+"""Limbs of people who are far away: trunk, head, arms and legs."""
+PALETTE_UNIT, ROOTS_UNIT, LOOKS_UNIT, LIMBS_UNIT, SHADOW_UNIT = range(5)
+
+
+class People:
+    """The crowd on the graphics side."""
+
+    def __init__(self, context: moderngl.Context, scene: Scene, quality: Quality) -> None:
+        self.context = context
+        self.scene = scene
+        self.quality = quality
+        self.picked = -1
+        self.upload_bytes = 0
+        count, skeleton = len(scene.stature), scene.skeleton
+        limbs = simple_limbs(skeleton)
+        self.build_count = 1
+        self._build = np.zeros(count, np.int32)
+        self._level = np.full(count, -1, np.int32)
+        self._begin = np.zeros(LEVELS * self.build_count + 1, np.int32)
+        self._drawn = np.zeros(count, np.int32)
+        scale = scene.segment_scale[:, flesh_segments(skeleton)]
+        self._joint_scale = np.rint(scale * (32767.0 / REACH)).astype(np.int16)
+        self._every_joint = np.arange(skeleton.joint_count, dtype=np.int32)
+        self._few_joints = np.unique(limbs.joint).astype(np.int32)
+        self._root = np.zeros((count, 8), np.float32)
+        self._full = np.zeros((min(count, quality.mesh_count), 8 * skeleton.joint_count), np.int16)
+        self._reduced = np.zeros((count, 8 * len(self._few_joints)), np.int16)
+        self._roots = Table(context, count, 2, "f4")
+        self._full_palette = Table(context, len(self._full), 2 * skeleton.joint_count, "ni2")
+        self._reduced_palette = Table(context, count, 2 * len(self._few_joints), "ni2")
+        self._looks = Table(context, count, LOOK_COLUMNS, "f4")
+        self._identity = np.full(count, -1, np.int64)
+        self._look = np.zeros((count, LOOK_COLUMNS, 4), np.float32)
+        self._height_factor = 1.0
+        self._compile()
+        self._fill_limbs(limbs)
+
+    # ---- what the camera sees
+
+    def update(
+        self,
+        frame: CrowdFrame,
+        planes: FloatArray,
+        eye: FloatArray,
+        pixels_at_one_metre: float,
+        origin: FloatArray,
+        *,
+        is_perspective: bool = True,
+        keeps_levels: bool = True,
+    ) -> None:
+        """Choose who is drawn and how, pack the poses and upload them.
+
+        Parameters
+        ----------
+        frame : CrowdFrame
+        planes : (6, 4) float64
+            Of the view, in world space.
+        eye : (3,) float64
+        pixels_at_one_metre : float
+        origin : (3,) float64
+            Point that becomes 0 on the graphics side.
+        is_perspective, keeps_levels : bool
+            Levels depend on those of the frame before, so that nobody flickers between two.
+        """
+        if not keeps_levels:
+            self._level[:] = -1
+        self._choose_levels(frame, planes, eye, pixels_at_one_metre, is_perspective)
+        drawn = self._drawn[: self._begin[-1]]
+        mesh_count = self.count_of_meshes()
+        self._pack(frame, drawn[:mesh_count], self._every_joint, origin, self._root, self._full)
+        root, reduced = self._root[mesh_count:], self._reduced[mesh_count:]
+        self._pack(frame, drawn[mesh_count:], self._few_joints, origin, root, reduced)
+        self.upload_bytes = self._roots.write(self._root[: len(drawn)])
+        self.upload_bytes += self._full_palette.write(self._full[:mesh_count])
+        self.upload_bytes += self._reduced_palette.write(self._reduced[mesh_count : len(drawn)])
+        self._update_looks(frame)
+
+    def _choose_levels(
+        self, frame: CrowdFrame, planes: FloatArray, eye: FloatArray, pixels: float, is_perspective: bool
+    ) -> None:
+        self._height_factor = max(1.0, self._height_factor / 1.05)
+        while True:
+            heights = np.array(self.quality.least_height)
+            heights[:MESH_LEVELS] *= self._height_factor if self.has_meshes else np.inf
+            levels_crowd(
+                frame.position_world,
+                frame.is_active,
+                self.scene.stature,
+                planes,
+                eye,
+                pixels,
+                is_perspective,
+                heights,
+                self._level,
+            )
+            sort_rows(self._level, self._build, self.build_count, self._begin, self._drawn)
+            if self.count_of_meshes() <= len(self._full):
+                return
+            self._height_factor *= 1.25
+
+    def _pack(
+        self,
+        frame: CrowdFrame,
+        drawn: npt.NDArray[np.int32],
+        joints: npt.NDArray[np.int32],
+        origin: FloatArray,
+        root: npt.NDArray[np.float32],
+        palette: npt.NDArray[np.int16],
+    ) -> None:
+        pack_crowd(
+            frame.position_world,
+            frame.yaw,
+            frame.joint_position_model,
+            frame.joint_rotation_model,
+            self._joint_scale,
+            self._build,
+            drawn,
+            joints,
+            origin,
+            root,
+            palette,
+        )
+
+    def _update_looks(self, frame: CrowdFrame) -> None:
+        """Draw looks of people who are new in their slots."""
+        changed = np.flatnonzero(frame.identity != self._identity)
+        if changed.size:
+            self._identity[changed] = frame.identity[changed]
+            self._look[changed] = draw_looks(frame.identity[changed], self.scene.skeleton.stature)
+            self._looks.write(self._look.reshape(len(self._look), -1))
+
+    def count_of_meshes(self) -> int:
+        """People drawn as meshes in this frame."""
+        return int(self._begin[MESH_LEVELS * self.build_count])
+
+    def counts(self) -> tuple[int, ...]:
+        """People drawn at each level."""
+        ends = self._begin[:: self.build_count]
+        return tuple(int(count) for count in np.diff(ends))
+
+    def seen_positions(self) -> npt.NDArray[np.float32]:
+        """Roots of all who are drawn, counted from the origin, m. (D, 3)."""
+        return self._root[: self._begin[-1], :3]
+
+    # ---- drawing
+
+    @property
+    def has_meshes(self) -> bool:
+        """There are bodies with a skin."""
+        return False
+
+    def draw(self, kind: str) -> None:
+        """Draw everyone: ``"colour"``, ``"shadow"`` or ``"identity"``."""
+        self._bind()
+        near, far = (int(self._begin[k * self.build_count]) for k in (MESH_LEVELS, MESH_LEVELS + 1))
+        self._draw_capsules(kind, near, far - near, self._limb_count)
+        self._draw_capsules(kind, far, int(self._begin[-1]) - far, min(FEW_LIMBS, self._limb_count))
+
+    def draw_blobs(self) -> None:
+        """Darken the ground below the feet of all but those far away."""
+        self._bind()
+        near, far = (int(self._begin[k * self.build_count]) for k in (MESH_LEVELS, MESH_LEVELS + 1))
+        if far > near:
+            program = self._blob_program
+            program["feet"] = self._feet_reduced
+            self._set_rows(program, near, reduced=True)
+            self._blobs.render(self.context.TRIANGLE_STRIP, instances=2 * (far - near))
+
+    def _draw_capsules(self, kind: str, first: int, count: int, limb_count: int) -> None:
+        if count == 0:
+            return
+        program, quads = self._capsules[kind]
+        self._set_rows(program, first, reduced=True)
+        program["limb_count"] = limb_count
+        if "picked" in program:
+            program["picked"] = self.picked
+        quads.render(self.context.TRIANGLE_STRIP, instances=count * limb_count)
+
+    def _set_rows(self, program: Any, first: int, *, reduced: bool) -> None:
+        """Say where the people of a draw are in the tables."""
+        program["first"] = first
+        program["palette_first"] = self.count_of_meshes() if reduced else 0
+        table = self._reduced_palette if reduced else self._full_palette
+        program["palette_width"] = table.width
+        table.texture.use(PALETTE_UNIT)
+
+    def _bind(self) -> None:
+        self._roots.texture.use(ROOTS_UNIT)
+        self._looks.texture.use(LOOKS_UNIT)
+        self._limbs.use(LIMBS_UNIT)
+
+    def release(self) -> None:
+        """Give the memory back."""
+        for table in (self._roots, self._full_palette, self._reduced_palette, self._looks):
+            table.release()
+        self._limbs.release()
+
+    def _compile(self) -> None:
+        context = self.context
+        constants: dict[str, Any] = {"LOOK_COLUMNS": LOOK_COLUMNS} | landmarks(self.scene.skeleton)
+        corners = np.array([-1, -1, 1, -1, -1, 1, 1, 1], np.float32)
+        self._corners = context.buffer(corners.tobytes())
+        self._capsules = {}
+        for kind in ("colour", "shadow", "identity"):
+            kinds = {} if kind == "colour" else {kind.upper(): ""}
+            towards = "sun.xyz" if kind == "shadow" else "towards_eye(middle)"
+            deep = {} if kind == "shadow" else {"DEEP": ""}
+            program = compile_program(
+                context,
+                ("view.glsl", "people.glsl", "capsule.vert"),
+                ("view.glsl", "people.glsl", "lighting.glsl", "clothes.glsl", "capsule.frag"),
+                TOWARDS=towards,
+                SMALLEST_COVER="0.02" if self.quality.samples else "0.5",
+                **constants,
+                **kinds,
+                **deep,
+            )
+            set_units(program)
+            quads = context.vertex_array(program, [(self._corners, "2f4", "corner")])
+            self._capsules[kind] = (program, quads)
+        self._blob_program = compile_program(
+            context, ("view.glsl", "people.glsl", "blob.vert"), ("blob.frag",), **constants
+        )
+        set_units(self._blob_program)
+        self._blobs = context.vertex_array(self._blob_program, [(self._corners, "2f4", "corner")])
+
+    def _fill_limbs(self, limbs: Any) -> None:
+        """Write the limbs of all builds to a texture."""
+        skeleton = self.scene.skeleton
+        rest, part = rest_positions(skeleton), joint_parts(skeleton)
+        place = np.searchsorted(self._few_joints, limbs.joint)
+        self._limb_count = len(limbs.joint)
+        table = np.zeros((self._limb_count, 3, 4), np.float32)
+        table[:, 0, :3] = limbs.start - rest[limbs.joint]
+        table[:, 0, 3] = limbs.radius
+        table[:, 1, :3] = limbs.end - rest[limbs.joint]
+        table[:, 1, 3] = place
+        table[:, 2, :3] = rest[limbs.joint]
+        table[:, 2, 3] = part[limbs.joint]
+        self._limbs = self.context.texture((3 * self._limb_count, 1), 4, table.tobytes(), dtype="f4")
+        self._limbs.filter = (self.context.NEAREST, self.context.NEAREST)
+        feet = [skeleton.joint(f"{side}_foot") for side in ("left", "right")]
+        self._feet_reduced = [int(np.searchsorted(self._few_joints, foot)) for foot in feet]
+
+
+def set_units(program: Any) -> None:
+    """Tell a program where its textures are."""
+    units = {
+        "palette": PALETTE_UNIT,
+        "roots": ROOTS_UNIT,
+        "looks": LOOKS_UNIT,
+        "limbs": LIMBS_UNIT,
+        "shadow_map": SHADOW_UNIT,
+    }
+    for name, unit in units.items():
+        if name in program:
+            program[name] = unit

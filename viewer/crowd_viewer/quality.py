@@ -1,0 +1,37 @@
+"""How much work goes into a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Settings of the renderer.
+
+    Attributes
+    ----------
+    least_height : tuple of float
+        Least height on the screen in pixels for the finest, middle and coarse mesh and for whole capsules;
+        smaller people get few capsules.
+    mesh_count : int
+        Most people drawn as meshes, the tallest on the screen first.
+    samples : int
+        Multisampling; 0 without.
+    shadow_size : int
+        Texels along each side of the shadow map; 0 without shadows.
+    shadow_reach : float
+        Half of the side of the ground on which shadows fall, at most, m.
+    """
+
+    least_height: tuple[float, float, float, float]
+    mesh_count: int
+    samples: int
+    shadow_size: int
+    shadow_reach: float
+
+
+FINE = Quality((150.0, 70.0, 34.0, 14.0), 2000, 4, 4096, 45.0)
+"""For pictures, videos and graphics cards."""
+FAST = Quality((400.0, 260.0, 160.0, 26.0), 12, 0, 1024, 25.0)
+"""For windows where the processor draws."""

@@ -1,0 +1,188 @@
+"""The renderer: passes that make one picture of a crowd in its surroundings."""
+
+from __future__ import annotations
+
+import math
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd_viewer.camera import Camera, view_planes
+from crowd_viewer.frame import CrowdFrame, Scene
+from crowd_viewer.people import SHADOW_UNIT, People
+from crowd_viewer.programs import VIEW_BINDING
+from crowd_viewer.quality import FINE, Quality
+from crowd_viewer.shadows import Light
+from crowd_viewer.surroundings import Surroundings
+from crowd_viewer.targets import Targets
+
+if TYPE_CHECKING:
+    import moderngl
+
+FloatArray = npt.NDArray[np.float64]
+Picture = npt.NDArray[np.uint8]
+FARTHEST = 3000.0
+ALPHA_TO_COVERAGE = 0x809E
+
+
+class Renderer:
+    """Draws frames of one scene; use it in a ``with`` block.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+    scene : Scene
+    size : tuple of int
+        Width and height of pictures, pixels.
+    quality : Quality
+    """
+
+    def __init__(
+        self, context: moderngl.Context, scene: Scene, size: tuple[int, int], quality: Quality = FINE
+    ) -> None:
+        self.context = context
+        self.scene = scene
+        self.quality = quality
+        low_x, high_x, low_z, high_z = scene.bounds
+        self.origin = np.array([0.5 * (low_x + high_x), 0.0, 0.5 * (low_z + high_z)])
+        self.targets = Targets(context, size, quality.samples)
+        self.light = Light(context, quality)
+        self.people = People(context, scene, quality)
+        self.surroundings = Surroundings(context, scene, self.origin)
+        self._view = context.buffer(reserve=192, dynamic=True)
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Draw pictures of another size from now on."""
+        if size != self.targets.size:
+            samples = self.quality.samples
+            self.targets.release()
+            self.targets = Targets(self.context, size, samples)
+
+    def draw(self, frame: CrowdFrame, camera: Camera, *, keeps_levels: bool = True) -> None:
+        """Draw a frame into `targets.picture`."""
+        self._prepare(frame, camera, keeps_levels=keeps_levels)
+        if self.light.is_on:
+            self._draw_shadows(frame)
+        self._draw_colours(frame)
+
+    def picture(self) -> Picture:
+        """What was drawn last. (H, W, 3), the upper left pixel first."""
+        return self.targets.read_picture()
+
+    def identities(
+        self, frame: CrowdFrame, camera: Camera
+    ) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32]]:
+        """Who is seen where, and how far away.
+
+        Returns
+        -------
+        identity : (H, W) uint32
+            Slot + 1; 0 where there is nobody.
+        depth : (H, W) float32
+            Distance along the camera's axis, m; infinite for the sky.
+        """
+        self._prepare(frame, camera, keeps_levels=False)
+        context, targets = self.context, self.targets
+        self._write_view(self._to_clip)
+        targets.use_identity()
+        context.enable_only(context.DEPTH_TEST)
+        self.surroundings.draw_solids(frame.time, is_plain=True)
+        self.people.draw("identity")
+        return targets.read_identity(), self._metres(targets.read_depth())
+
+    def release(self) -> None:
+        """Give the memory of the pictures back."""
+        self.targets.release()
+        self.light.release()
+        self.people.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+    # ---- passes
+
+    def _prepare(self, frame: CrowdFrame, camera: Camera, *, keeps_levels: bool) -> None:
+        """Compute matrices, and choose and upload who is seen."""
+        width, height = self.targets.size
+        self.camera = camera
+        projection = camera.projection(width / height, FARTHEST)
+        self._projection = projection
+        self._to_clip = projection @ camera.view(self.origin)
+        self._eye = np.asarray(camera.eye) - self.origin
+        self.people.update(
+            frame,
+            view_planes(projection @ camera.view(np.zeros(3))),
+            np.asarray(camera.eye, np.float64),
+            camera.pixels_at_one_metre(height),
+            self.origin,
+            is_perspective=camera.is_perspective,
+            keeps_levels=keeps_levels,
+        )
+        self.light.aim(self.people.seen_positions(), self._eye, camera.axes()[2])
+
+    def _write_view(self, to_clip: FloatArray) -> None:
+        ahead = self.camera.axes()[2]
+        low_x, high_x, low_z, high_z = self.scene.bounds
+        origin = self.origin
+        values = [
+            *to_clip.T.ravel(),
+            *self.light.matrix.T.ravel(),
+            *self._eye,
+            float(self.camera.is_perspective),
+            *ahead,
+            self.light.softness,
+            *self.light.direction,
+            self.light.bias,
+            low_x - origin[0],
+            low_z - origin[2],
+            high_x - origin[0],
+            high_z - origin[2],
+        ]
+        self._view.write(np.array(values, np.float32).tobytes())
+        self._view.bind_to_uniform_block(VIEW_BINDING)
+
+    def _draw_shadows(self, frame: CrowdFrame) -> None:
+        context = self.context
+        self._write_view(self.light.matrix)
+        self.light.use()
+        context.enable_only(context.DEPTH_TEST)
+        self.surroundings.draw_solids(frame.time, is_plain=True)
+        self.people.draw("shadow")
+
+    def _draw_colours(self, frame: CrowdFrame) -> None:
+        context = self.context
+        self._write_view(self._to_clip)
+        self.targets.use_picture()
+        self.light.map.use(SHADOW_UNIT)
+        context.enable_only(context.DEPTH_TEST)
+        context.depth_func = "<="
+        self.surroundings.draw_solids(frame.time)
+        if self.quality.samples:
+            context.enable_direct(ALPHA_TO_COVERAGE)
+        self.people.draw("colour")
+        if self.quality.samples:
+            context.disable_direct(ALPHA_TO_COVERAGE)
+        self.surroundings.draw_ground(self._eye)
+        self.surroundings.draw_sky(np.linalg.inv(self._to_clip).astype(np.float64))
+        context.enable(context.BLEND)
+        context.blend_func = context.SRC_ALPHA, context.ONE_MINUS_SRC_ALPHA
+        self.people.draw_blobs()
+        context.disable(context.BLEND)
+        self.targets.resolve()
+
+    def _metres(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        """Distance along the camera's axis from what the depth buffer holds."""
+        clip = 2.0 * depth.astype(np.float64) - 1.0
+        matrix = self._projection
+        if self.camera.is_perspective:
+            distance = matrix[2, 3] / (clip + matrix[2, 2])
+        else:
+            distance = -(clip - matrix[2, 3]) / matrix[2, 2]
+        return np.where(depth >= 1.0, math.inf, np.abs(distance)).astype(np.float32)

@@ -1,0 +1,32 @@
+in vec3 position;
+in vec3 normal;
+in uvec4 joint;
+in vec4 weight;
+in vec2 part;              // share of the arm and of the hand in the vertex
+uniform vec3 rest[MOST_JOINTS];
+out vec3 place;
+out vec3 facing;
+out vec3 rest_place;
+out vec3 rest_normal;
+out vec2 limb;
+flat out int slot;
+
+void main() {
+    int row = first + gl_InstanceID;
+    Root root = root_of(row);
+    vec3 point = vec3(0.0), direction = vec3(0.0);
+    for (int k = 0; k < 4; k++) {
+        int number = int(joint[k]);
+        vec4 rotation = texelFetch(palette, palette_texel(row - palette_first, 2 * number), 0);
+        vec4 moved = texelFetch(palette, palette_texel(row - palette_first, 2 * number + 1), 0) * REACH;
+        point += weight[k] * (moved.xyz + moved.w * turned(rotation, position - rest[number]));
+        direction += weight[k] * turned(rotation, normal);
+    }
+    place = to_world(root, point);
+    facing = to_world_direction(root, direction);
+    rest_place = position;
+    rest_normal = normal;
+    limb = part;
+    slot = root.slot;
+    gl_Position = to_clip * vec4(place, 1.0);
+}

@@ -1,0 +1,5 @@
+out uint number;
+
+void main() {
+    number = 0u;
+}

@@ -1,0 +1,16 @@
+in vec3 place;
+in vec3 facing;
+flat in float top;
+out vec4 colour;
+
+void main() {
+    vec3 normal = normalize(facing);
+    vec3 stone = mix(vec3(0.46, 0.43, 0.39), vec3(0.60, 0.56, 0.50), smoothstep(0.3, 2.5, top));
+    float along = abs(normal.x) > abs(normal.z) ? place.z : place.x;
+    float course = smoothstep(0.0, 1.5 * fwidth(place.y) + 0.004, abs(fract(place.y / 0.5) - 0.5) * 0.5 - 0.006);
+    float is_wall = 1.0 - smoothstep(0.5, 0.7, abs(normal.y));
+    stone *= mix(1.0, 0.90 + 0.10 * course, is_wall * step(1.2, top) * smoothstep(0.12, 0.02, fwidth(place.y)));
+    stone *= 1.0 - 0.35 * is_wall * exp(-place.y * 6.0);
+    stone *= 1.0 + 0.02 * sin(along * 1.7) * is_wall;
+    colour = displayed(hazy(lit(stone, 0.03, place, normal), place));
+}

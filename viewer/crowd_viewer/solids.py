@@ -1,0 +1,114 @@
+"""Walls and obstacles as triangles: upright prisms over outlines on the ground."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from crowd.scenario.geometry import obstacles
+from crowd.scenario.schema import WorldTable
+
+FloatArray = npt.NDArray[np.float64]
+Float32Array = npt.NDArray[np.float32]
+
+WALL_THICKNESS = 0.12
+BEVEL = 0.025
+"""Width of the slanted rim, which catches light as edges of real things do, m."""
+UNKNOWN_HEIGHT = 1.0
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Triangles of something solid, and when it is there.
+
+    Attributes
+    ----------
+    vertex : (T * 3, 7) float32
+        Position, normal, and height of the whole thing, m; three rows make a triangle, anticlockwise from
+        outside.
+    appear_at, disappear_at : float
+        s; infinite for ever.
+    """
+
+    vertex: Float32Array
+    appear_at: float = 0.0
+    disappear_at: float = math.inf
+
+
+def scenario_solids(world: WorldTable) -> Iterator[Solid]:
+    """Everything solid in a scenario's world."""
+    for _, item, shape in obstacles(world):
+        thick = _thickened(shape)
+        last = math.inf if item.disappear_at is None else item.disappear_at
+        if item.height > 0.0:
+            yield Solid(prism(thick, item.height), item.appear_at, last)
+
+
+def wall_solids(walls: FloatArray, appear_at: FloatArray, disappear_at: FloatArray) -> Iterator[Solid]:
+    """Segments (W, 2, 3) as walls of a recording, which knows no heights."""
+    for index, ends in enumerate(walls):
+        line = shapely.LineString(ends[:, [0, 2]])
+        vertex = prism(_thickened(line), UNKNOWN_HEIGHT)
+        yield Solid(vertex, float(appear_at[index]), float(disappear_at[index]))
+
+
+def _thickened(shape: BaseGeometry) -> BaseGeometry:
+    """Walls get a thickness; what has an area stays."""
+    if shape.area > 0.0:
+        return shape
+    return shape.buffer(0.5 * WALL_THICKNESS, cap_style="square", join_style="mitre")
+
+
+def prism(outline: BaseGeometry, height: float) -> Float32Array:
+    """Triangles (T * 3, 7) of a prism on the ground with a slanted rim at its top."""
+    parts: list[FloatArray] = []
+    for polygon in getattr(outline, "geoms", [outline]):
+        ring = shapely.geometry.polygon.orient(polygon, -1.0)
+        rim = min(BEVEL, 0.25 * height)
+        top = ring.buffer(-rim, join_style="mitre")
+        if top.is_empty or top.geom_type != "Polygon" or len(top.interiors) != len(ring.interiors):
+            top, rim = ring, 0.0
+        top = shapely.geometry.polygon.orient(top, -1.0)
+        parts.append(_top(top, height))
+        for lower, upper in zip(_rings(ring), _rings(top), strict=True):
+            parts.append(_band(lower, 0.0, lower, height - rim))
+            if rim > 0.0 and len(lower) == len(upper):
+                start = np.argmin(((upper[:-1] - lower[0]) ** 2).sum(axis=1))
+                turned = np.roll(upper[:-1], -start, axis=0)
+                parts.append(_band(lower, height - rim, np.vstack([turned, turned[:1]]), height))
+    points = np.concatenate(parts)
+    return np.hstack([points, np.full((len(points), 1), height)]).astype(np.float32)
+
+
+def _rings(polygon: BaseGeometry) -> list[FloatArray]:
+    return [np.array(ring.coords) for ring in (polygon.exterior, *polygon.interiors)]
+
+
+def _top(polygon: BaseGeometry, height: float) -> FloatArray:
+    """Triangles of a level surface."""
+    rows: list[list[float]] = []
+    for triangle in shapely.constrained_delaunay_triangles(polygon).geoms:
+        corners = np.array(shapely.geometry.polygon.orient(triangle, -1.0).exterior.coords)[:3]
+        rows.extend([x, height, z, 0.0, 1.0, 0.0] for x, z in corners)
+    return np.array(rows).reshape(-1, 6)
+
+
+def _band(low: FloatArray, low_y: float, high: FloatArray, high_y: float) -> FloatArray:
+    """Faces between a ring (K, 2) and one above it, with the solid on the right of each edge."""
+    a, b = _raised(low[:-1], low_y), _raised(low[1:], low_y)
+    c, d = _raised(high[:-1], high_y), _raised(high[1:], high_y)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal /= np.where(length > 0.0, length, 1.0)
+    corners = np.stack([a, b, c, b, d, c], axis=1)
+    return np.concatenate([corners, np.repeat(normal[:, None], 6, axis=1)], axis=2).reshape(-1, 6)
+
+
+def _raised(points: FloatArray, y: float) -> FloatArray:
+    return np.stack([points[:, 0], np.full(len(points), y), points[:, 1]], axis=1)
