@@ -10,6 +10,9 @@ from crowd.errors import MotionError, describe
 from crowd.motion.formats.smartbody_channels import ChannelData, SmartBodySkeleton, choose_skeleton
 from crowd.motion.formats.smartbody_skeleton import read_sk
 
+NEAR_GROUPS = 2
+"""Groups of folders whose skeletons are meant for a clip: a broken one among these is an error."""
+
 
 def skeleton_files(path: Path, suffix: str) -> Iterator[list[Path]]:
     """Skeleton files by nearness: beside a motion file; in its parent folder and that one's other folders;
@@ -40,10 +43,18 @@ def smartbody_skeleton(data: ChannelData, stated: Path | None) -> SmartBodySkele
         return read_sk(stated)
     joints = {joint for joint, _ in data.channels}
     tried: list[SmartBodySkeleton] = []
-    for files in skeleton_files(data.path, ".sk"):
-        bodies = [_cached(file, file.stat().st_mtime_ns) for file in files]
+    for number, files in enumerate(skeleton_files(data.path, ".sk")):
+        bodies = []
+        broken: MotionError | None = None
+        for file in files:
+            try:
+                bodies.append(_cached(file, file.stat().st_mtime_ns))
+            except MotionError as error:
+                broken = broken or error
         if any(2 * len(joints.intersection(body.skeleton.joint_names)) >= len(joints) for body in bodies):
             return choose_skeleton(data.path, data.channels, bodies)
+        if broken is not None and number < NEAR_GROUPS:
+            raise broken
         tried += bodies
     return choose_skeleton(data.path, data.channels, tried)
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from crowd.errors import MotionError, describe
+from crowd.motion.formats.joint_list import check_size
 from crowd.motion.formats.text import read_bytes
 from crowd.motion.rotation import conjugate, multiply, rotate, slerp
 from crowd.motion.source import SourceMotion, SourceSkeleton
@@ -379,6 +380,8 @@ def _animate(
     end = max((float(times.max()) for *_, times, _ in tracks), default=0.0)
     if not 0.0 <= end <= LONGEST:
         raise MotionError(describe(where, "is too long", f"{end:g} s", f"up to {LONGEST:g} s"))
+    # All nodes are chained as matrices, four times as large as a pose.
+    check_size(document.path, 4.0 * end * rate, len(document.parent))
     time = np.arange(round(end * rate) + 1) / rate
     frames = len(time)
     parts = {

@@ -131,7 +131,8 @@ def _pose(data: ChannelData, body: SmartBodySkeleton) -> tuple[FloatArray, Float
     columns: dict[str, dict[int, int]] = defaultdict(dict)
     column = 0
     for joint, kind in data.channels:
-        if (joint, kind) in body.channels:
+        # Position channels count for every joint, as in clips that stretch limbs of a rigid skeleton.
+        if (joint, kind) in body.channels or (kind in POSITIONS and joint in joint_index):
             columns[kind][joint_index[joint]] = column
         column += data.widths.get(kind, 1)
     for axis, kind in enumerate(POSITIONS):
