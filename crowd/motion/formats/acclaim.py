@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import compress
 from pathlib import Path
 from typing import NoReturn
 
@@ -293,8 +294,9 @@ def _as_joints(asf: AcclaimSkeleton) -> SourceSkeleton:
 def _read_frames(path: Path, asf: AcclaimSkeleton) -> tuple[list[str], FloatArray]:
     """Bones in the order of the frames, and their values (frames, columns)."""
     source = TextFile(path)
-    lines = [line for line, text in enumerate(source.lines, 1) if text.strip() and text[0] not in "#:"]
-    texts = [source.lines[line - 1] for line in lines]
+    kept = [text != "" and text[0] not in "#:" and not text.isspace() for text in source.lines]
+    lines = list(compress(range(1, len(kept) + 1), kept))
+    texts = list(compress(source.lines, kept))
     if any(text.strip().lower() == ":radians" for text in source.lines[:_HEADER_LINES]):
         asf.radians = 1.0
     if not texts:
