@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -16,10 +16,11 @@ import typer
 from crowd.errors import SettingsError, describe
 
 if TYPE_CHECKING:
+    from crowd.cli.showing import FrameSink
     from crowd.motion.library import MotionLibrary
     from crowd.recording import Recorder
     from crowd.scenario import Scenario
-    from crowd.simulation import Simulation
+    from crowd.simulation import Frame, Simulation
 
 EXIT_NOT_AS_EXPECTED = 1
 EXIT_INTERRUPTED = 130
@@ -48,20 +49,22 @@ def run(
     ] = False,
 ) -> int:
     """Run a scenario and print a summary."""
-    _refuse_what_is_missing(view=view, video=video, picture=picture)
     if seconds is not None and not 0.0 < seconds <= 86_400.0:
         raise SettingsError(describe("--seconds", "is out of range", seconds, "> 0 to 86400"))
     from crowd.cli.output import require_folder, write_json
+    from crowd.cli.showing import draw_picture, film, require_viewer
     from crowd.motion.library_file import load_library
     from crowd.scenario import load_scenario
 
+    require_viewer(picture, video, view=view)
     require_folder("--record", record)
     require_folder("--metrics", metrics)
     loaded = load_scenario(scenario)
     library = None if motions is None else load_library(motions)
     simulation, compile_seconds = _prepare(loaded, seed, threads, characters, library)
-    recorder = _open_recorder(record, simulation)
-    wall_seconds, was_stopped = _advance(simulation, recorder, seconds)
+    sinks = [sink for sink in (_open_recorder(record, simulation), film(video, simulation)) if sink]
+    wall_seconds, was_stopped = _advance(simulation, sinks, seconds, is_shown=view)
+    draw_picture(picture, simulation)
     measured = measured_facts(simulation, wall_seconds, compile_seconds, was_stopped=was_stopped)
     if metrics is not None:
         write_json(metrics, measured)
@@ -69,29 +72,11 @@ def run(
     from crowd.cli.summary import print_summary
 
     verdicts = judge(loaded.expect, measured)
-    print_summary(measured, verdicts, [path for path in (record, metrics) if path is not None])
+    written = [path for path in (record, metrics, video, picture) if path is not None]
+    print_summary(measured, verdicts, written)
     if was_stopped:
         return EXIT_INTERRUPTED
     return EXIT_NOT_AS_EXPECTED if check and not all(verdict.is_met for verdict in verdicts) else 0
-
-
-def _refuse_what_is_missing(*, view: bool, video: Path | None, picture: Path | None) -> None:
-    """Refuse options whose parts this version does not have.
-
-    Raises
-    ------
-    SettingsError
-        One of them was given.
-    """
-    for option, is_given in (
-        ("--view", view),
-        ("--video", video is not None),
-        ("--picture", picture is not None),
-    ):
-        if is_given:
-            raise SettingsError(
-                describe(option, "the viewer is not part of this version", allowed="--record and --metrics")
-            )
 
 
 def _prepare(
@@ -154,7 +139,9 @@ class StopRequest:
                 signal.signal(number, handler)
 
 
-def _advance(simulation: Simulation, recorder: Recorder | None, seconds: float | None) -> tuple[float, bool]:
+def _advance(
+    simulation: Simulation, sinks: Sequence[FrameSink], seconds: float | None, *, is_shown: bool
+) -> tuple[float, bool]:
     """Step to the end with a progress bar; returns the wall time, s, and whether Ctrl-C ended it."""
     from crowd.cli.progress import RunProgress
 
@@ -163,19 +150,31 @@ def _advance(simulation: Simulation, recorder: Recorder | None, seconds: float |
     frame_count = max(1, round((seconds or simulation.scenario.seconds) / simulation.dt))
     begin = time.perf_counter()
     request = StopRequest()
+    frames = _frames(simulation, frame_count, is_shown=is_shown)
     try:
         with request.watching(), RunProgress(simulation, frame_count) as progress:
-            for _ in range(frame_count):
-                frame = simulation.step()
-                if recorder is not None:
-                    recorder.record(frame)
+            for frame in frames:
+                for sink in sinks:
+                    sink.record(frame)
                 progress.advance(frame)
                 if request.is_made or (ends_early and simulation.is_finished):
                     break
     finally:
-        if recorder is not None:
-            recorder.close()
+        frames.close()
+        for sink in sinks:
+            sink.close()
     return time.perf_counter() - begin, request.is_made
+
+
+def _frames(simulation: Simulation, frame_count: int, *, is_shown: bool) -> Generator[Frame, None, None]:
+    """Step a simulation; in a window that is shown, as fast as time goes there and until it is closed."""
+    if is_shown:
+        from crowd_viewer.window import shown_frames
+
+        yield from shown_frames(simulation, frame_count)
+        return
+    for _ in range(frame_count):
+        yield simulation.step()
 
 
 def measured_facts(

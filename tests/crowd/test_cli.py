@@ -30,9 +30,6 @@ from crowd.scenario.schema import Bound
             ["run", "plazza"],
             "scenario: unknown name; got 'plazza'; allowed a .toml or .xml file, or \"plaza\"",
         ),
-        (["run", "plaza", "--view"], "--view: the viewer is not part of this version; "),
-        (["run", "plaza", "--video", "a.mp4"], "--video: the viewer is not part of this version; "),
-        (["run", "plaza", "--picture", "a.png"], "--picture: the viewer is not part of this version; "),
         (
             ["run", "plaza", "--motions", "here"],
             "--motions: motion libraries cannot be read in this version; ",

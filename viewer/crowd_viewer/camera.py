@@ -53,7 +53,7 @@ class Camera:
 
     @classmethod
     def framing(
-        cls, points: FloatArray, aspect: float, azimuth: float = 0.5, elevation: float = 0.42
+        cls, points: FloatArray, aspect: float, azimuth: float = 0.5, elevation: float = 0.30
     ) -> Self:
         """See all points, (P, 3) m, from an angle above."""
         low, high = points.min(axis=0), points.max(axis=0)

@@ -11,12 +11,14 @@ from crowd.errors import describe
 from crowd.recording import Recording
 from crowd.simulation import Simulation
 from crowd_viewer.camera import Camera
-from crowd_viewer.context import ViewerError, headless_context
+from crowd_viewer.context import INSTALL, ViewerError, headless_context
 from crowd_viewer.frame import CrowdFrame, Scene, source_of
 from crowd_viewer.quality import FINE, Quality
 from crowd_viewer.renderer import Renderer
 
 Picture = npt.NDArray[np.uint8]
+OUTLIERS = 0.12
+"""Share of people at each side who may be outside of a picture that nobody has chosen a camera for."""
 
 
 def render(
@@ -77,16 +79,33 @@ def render_identities(
 
 
 def default_camera(scene: Scene, frame: CrowdFrame, size: tuple[int, int]) -> Camera:
-    """See the ground of the scene, or the people where it is much larger than what they take."""
+    """See most of the people from ahead and above, or the ground where there is nobody."""
     low_x, high_x, low_z, high_z = scene.bounds
-    corners = np.array(
-        [[low_x, 0, low_z], [low_x, 0, high_z], [high_x, 0, low_z], [high_x, 0, high_z]], float
-    )
+    low, high = np.array([low_x, 0.0, low_z]), np.array([high_x, 0.0, high_z])
     there = frame.position_world[frame.is_active]
     if len(there):
-        low, high = there.min(axis=0) - 2.0, there.max(axis=0) + 2.0
-        corners[:, [0, 2]] = np.clip(corners[:, [0, 2]], low[[0, 2]], high[[0, 2]])
+        share = 100.0 * OUTLIERS if len(there) > 20 else 0.0
+        low = np.percentile(there, share, axis=0) - 1.0
+        high = np.percentile(there, 100.0 - share, axis=0) + 1.0
+    corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
     return Camera.framing(corners, size[0] / size[1])
+
+
+def require_pillow(path: Path) -> None:
+    """Check that pictures can be written.
+
+    Raises
+    ------
+    ViewerError
+        Pillow is missing, or knows no format with this ending.
+    """
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise ViewerError(describe(str(path), "pillow is not installed", allowed=INSTALL)) from error
+    known = Image.registered_extensions()
+    if path.suffix.lower() not in known:
+        raise ViewerError(describe(str(path), "is no kind of picture", path.suffix, ".png, .jpg, .webp"))
 
 
 def write_picture(path: Path, picture: Picture) -> None:
@@ -97,11 +116,9 @@ def write_picture(path: Path, picture: Picture) -> None:
     ViewerError
         Pillow is missing, or the file cannot be written.
     """
-    try:
-        from PIL import Image
-    except ImportError as error:
-        allowed = 'pip install "crowd-engine[viewer]"'
-        raise ViewerError(describe(str(path), "pillow is not installed", allowed=allowed)) from error
+    require_pillow(path)
+    from PIL import Image
+
     try:
         Image.fromarray(picture).save(path)
     except (OSError, ValueError) as error:

@@ -1,0 +1,102 @@
+"""What a run shows: a picture, a video, or a window. The viewer is loaded only when one is asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Protocol
+
+import typer
+
+if TYPE_CHECKING:
+    from crowd.simulation import Frame, Simulation
+
+
+class FrameSink(Protocol):
+    """Whatever takes the frames of a run one after the other."""
+
+    def record(self, frame: Frame) -> None:
+        """Take a frame."""
+
+    def close(self) -> None:
+        """Finish."""
+
+
+def require_viewer(picture: Path | None, video: Path | None, *, view: bool) -> None:
+    """Refuse what could not be shown, before a long run begins.
+
+    Raises
+    ------
+    ViewerError
+        Packages or OpenGL are missing; the message says what to install.
+    """
+    if picture is None and video is None and not view:
+        return
+    from crowd.cli.output import require_folder
+
+    require_folder("--picture", picture)
+    require_folder("--video", video)
+    from crowd_viewer.context import headless_context, require_moderngl
+
+    if view:
+        require_moderngl()
+        from crowd_viewer.window import require_glfw
+
+        require_glfw()
+    if video is not None:
+        from crowd_viewer.video import require_encoder
+
+        require_encoder(video)
+    if picture is not None:
+        from crowd_viewer.picture import require_pillow
+
+        require_pillow(picture)
+    if picture is not None or video is not None:
+        headless_context()
+
+
+def film(path: Path | None, simulation: Simulation) -> FrameSink | None:
+    """What makes a video of a run."""
+    if path is None:
+        return None
+    from crowd_viewer.video import Film
+
+    return Film(path, simulation)
+
+
+def draw_picture(path: Path | None, simulation: Simulation) -> None:
+    """Draw the present frame to a file."""
+    if path is None:
+        return
+    from crowd_viewer.picture import render, write_picture
+
+    write_picture(path, render(simulation))
+
+
+def view(
+    recording: Annotated[Path, typer.Argument(help="Recording made by `crowd run --record`.")],
+    video: Annotated[Path | None, typer.Option(help="Write a video instead of opening a window.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write a picture instead of opening a window.")] = None,
+    time: Annotated[float | None, typer.Option(help="Moment of the picture, s; the last one.")] = None,
+    camera: Annotated[str | None, typer.Option(help='{"eye": [x, y, z], "target": [x, y, z]}, m.')] = None,
+) -> int:
+    """Watch a recording."""
+    is_window = video is None and picture is None
+    require_viewer(picture, video, view=is_window)
+    from crowd.recording import Recording
+    from crowd_viewer.camera import Camera
+
+    chosen = None if camera is None else Camera.from_json(camera)
+    with Recording(recording) as opened:
+        if picture is not None:
+            from crowd_viewer.picture import render, write_picture
+
+            write_picture(picture, render(opened, time=time, camera=chosen))
+        if video is not None:
+            from crowd_viewer.video import film_recording
+
+            film_recording(opened, video, camera=chosen)
+        if is_window:
+            from crowd_viewer.window import show
+
+            show(opened, camera=chosen)
+    return 0

@@ -1,0 +1,49 @@
+"""Pictures and videos from the command line."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from crowd.cli import exit_code
+
+
+def test_wrong_files_are_refused_before_the_run(drawing, capsys):
+    pytest.importorskip("imageio_ffmpeg")
+    for arguments, expected in (
+        (["--video", "a.gif"], "a.gif: is no kind of video; got '.gif'; allowed .mp4"),
+        (["--picture", "a.mp3"], "a.mp3: is no kind of picture; got '.mp3'"),
+        (["--picture", "/no/a.png"], "--picture: there is no such folder; got '/no'"),
+    ):
+        assert exit_code(["run", "plaza", *arguments]) == 2
+        assert capsys.readouterr().err.startswith(expected)
+
+
+def test_a_run_leaves_a_picture_a_video_and_a_recording_to_view(drawing, tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    image = pytest.importorskip("PIL.Image")
+    imageio = pytest.importorskip("imageio.v3")
+    picture, video, recording = (tmp_path / name for name in ("a.png", "a.mp4", "a.h5"))
+    arguments = ["run", "plaza", "--characters", 20, "--seconds", 0.5, "--threads", 1]
+    arguments += ["--picture", picture, "--video", video, "--record", recording]
+    assert exit_code([str(argument) for argument in arguments]) == 0
+    pixels = np.asarray(image.open(picture))
+    assert pixels.shape == (720, 1280, 3)
+    assert pixels.std() > 15
+    frames = imageio.imread(video)
+    assert frames.shape == (15, 720, 1280, 3)
+    # People move: the last picture is not the first.
+    assert np.abs(frames[-1].astype(float) - frames[0]).max() > 40
+    replay = tmp_path / "b.png"
+    camera = '{"eye": [5, 3, 9], "target": [0, 1, 0]}'
+    command = ["view", recording, "--picture", replay, "--time", 0.2, "--camera", camera]
+    assert exit_code([str(argument) for argument in command]) == 0
+    assert np.asarray(image.open(replay)).std() > 15
+
+
+def test_the_viewer_is_loaded_only_when_something_is_shown():
+    loaded = "[name for name in sys.modules if name.partition('.')[0] in ('crowd_viewer', 'moderngl')]"
+    code = f"import crowd.cli, sys; print({loaded})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,6 @@
+flat in vec4 shade;
+out vec4 colour;
+
+void main() {
+    colour = shade;
+}
