@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,14 +14,39 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import RecordingError, describe
+from crowd.motion.rotation import about, multiply, rotate
 from crowd.motion.skeleton import Skeleton
+from crowd.motion.source import world_pose
 from crowd.recorder import FORMAT, PELVIS, ROTATION, STATE_FIELDS, Field, Recorder, reason
 
-__all__ = ["STATE_FIELDS", "Field", "Recorder", "Recording"]
+__all__ = ["STATE_FIELDS", "Field", "Poses", "Recorder", "Recording"]
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[Any]
 AnyArray = npt.NDArray[Any]
 Rows = int | slice
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses of some characters in some frames.
+
+    Attributes
+    ----------
+    position_world : (F, C, 3) float64
+        Roots on the ground, m.
+    yaw : (F, C) float64
+        rad.
+    rotation : (F, C, J, 4) float64
+        Against the parent joint; the pelvis against the world.
+    pelvis_world : (F, C, 3) float64
+        m.
+    """
+
+    position_world: FloatArray
+    yaw: FloatArray
+    rotation: FloatArray
+    pelvis_world: FloatArray
 
 
 class Recording:
@@ -139,27 +165,42 @@ class Recording:
 
     def joint_rotations_local(self, frame: int) -> FloatArray:
         """Rotations against the parent joints, unit quaternions. (character, joint, 4)."""
-        rotation = self.read(ROTATION, frame).astype(np.float64)
-        length = np.sqrt((rotation * rotation).sum(axis=-1, keepdims=True))
-        rotation[..., 0] += length[..., 0] == 0.0
-        return np.asarray(rotation / np.where(length == 0.0, 1.0, length))
+        return _unit(self.read(ROTATION, frame))
+
+    def poses(self, frames: slice, characters: IntArray) -> Poses:
+        """Read poses of some characters in some frames.
+
+        Parameters
+        ----------
+        frames : slice
+        characters : (C,) int
+            Slots.
+        """
+        position = self.read("position_world", frames)[:, characters]
+        yaw = self.read("yaw", frames)[:, characters]
+        rotation = _unit(self.read(ROTATION, frames)[:, characters])
+        pelvis = self.read(PELVIS, frames)[:, characters].astype(np.float64)
+        heading = about(1, yaw)
+        rotation[..., 0, :] = multiply(heading, rotation[..., 0, :])
+        return Poses(position, yaw, rotation, position + rotate(heading, pelvis))
+
+    def joint_offsets(self, characters: IntArray) -> FloatArray:
+        """Joint offsets of some characters in their own proportions, m. (C, joint, 3)."""
+        return np.asarray(
+            self.skeleton.offset * self.segment_scale[characters][:, self.skeleton.segment, None]
+        )
 
     def joint_positions_world(self, frame: int) -> FloatArray:
         """Joints in world space, m. (character, joint, 3); rows of empty slots mean nothing."""
-        skeleton = self.skeleton
-        local = self.joint_rotations_local(frame)
-        yaw = self.read("yaw", frame)
-        heading = np.stack([np.cos(yaw / 2), 0 * yaw, np.sin(yaw / 2), 0 * yaw], axis=1)
-        offset = skeleton.offset * self.segment_scale[:, skeleton.segment, None]
-        position = np.zeros((len(yaw), skeleton.joint_count, 3))
-        rotation = np.zeros((len(yaw), skeleton.joint_count, 4))
-        rotation[:, 0] = _product(heading, local[:, 0])
-        position[:, 0] = self.read("position_world", frame) + _turned(heading, self.read(PELVIS, frame))
-        for joint in range(1, skeleton.joint_count):
-            parent = int(skeleton.parent[joint])
-            rotation[:, joint] = _product(rotation[:, parent], local[:, joint])
-            position[:, joint] = position[:, parent] + _turned(rotation[:, parent], offset[:, joint])
-        return position
+        everyone = np.arange(self.character_count)
+        poses = self.poses(slice(frame, frame + 1 or None), everyone)
+        return np.asarray(self.posed(poses, everyone)[1][0])
+
+    def posed(self, poses: Poses, characters: IntArray) -> tuple[FloatArray, FloatArray]:
+        """World rotations (F, C, J, 4) and positions (F, C, J, 3), m, of poses."""
+        offset = np.broadcast_to(self.joint_offsets(characters), (*poses.rotation.shape[:3], 3)).copy()
+        offset[..., 0, :] = poses.pelvis_world
+        return world_pose(self.skeleton.parent, poses.rotation, offset)
 
     def frames(self) -> Iterator[tuple[float, dict[str, AnyArray]]]:
         """Go through all frames: time, s, and all quantities but the pose."""
@@ -180,20 +221,9 @@ class Recording:
         self.close()
 
 
-def _product(first: FloatArray, second: FloatArray) -> FloatArray:
-    w, x, y, z = np.moveaxis(first, -1, 0)
-    a, b, c, d = np.moveaxis(second, -1, 0)
-    return np.stack(
-        [
-            w * a - x * b - y * c - z * d,
-            w * b + x * a + y * d - z * c,
-            w * c - x * d + y * a + z * b,
-            w * d + x * c - y * b + z * a,
-        ],
-        axis=-1,
-    )
-
-
-def _turned(rotation: FloatArray, vector: FloatArray) -> FloatArray:
-    twice = 2.0 * np.cross(rotation[..., 1:], vector)
-    return np.asarray(vector + rotation[..., :1] * twice + np.cross(rotation[..., 1:], twice), np.float64)
+def _unit(rotation: AnyArray) -> FloatArray:
+    """Unit quaternions of recorded ones; empty rows become the identity."""
+    values = rotation.astype(np.float64)
+    length = np.sqrt((values * values).sum(axis=-1, keepdims=True))
+    values[..., 0] += length[..., 0] == 0.0
+    return np.asarray(values / np.where(length == 0.0, 1.0, length))

@@ -252,7 +252,8 @@ def _image(document: Document, source: dict[str, Any]) -> bytes:
     if "bufferView" in source:
         view = document.items("bufferViews")[source["bufferView"]]
         first = int(view.get("byteOffset", 0))
-        return document.buffers[view.get("buffer", 0)][first : first + int(view["byteLength"])]
+        data: bytes = document.buffers[view.get("buffer", 0)]
+        return data[first : first + int(view["byteLength"])]
     uri = str(source["uri"])
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])

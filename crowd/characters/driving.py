@@ -66,6 +66,12 @@ class Driver:
         """Hip to ankle of the character, file units."""
         return self._upper + self._lower
 
+    def rest_pose(self) -> tuple[FloatArray, FloatArray]:
+        """Positions (K, 3), file units, and rotations (K, 4) of the joints in the bind pose, in our axes."""
+        axes = [rotate(self.convention.to_ours, self.character.rest[:, :3, column]) for column in range(3)]
+        unit = [axis / np.linalg.norm(axis, axis=1, keepdims=True) for axis in axes]
+        return self._rest_position, from_axes(*unit)
+
     def skin_matrices(self, rotation_world: FloatArray, position_world: FloatArray) -> Float32Array:
         """Matrices that take the character's mesh to world space.
 

@@ -1,4 +1,4 @@
-"""The command line: ``crowd run``, ``crowd view``, ``crowd list``, ``crowd motions``, ``crowd bench``.
+"""The command line: ``crowd`` with its commands run, view, list, motions, export and bench.
 
 Exit codes: 0 done; 1 the run is not what the scenario expects (with ``--check``), or a benchmark case failed;
 2 something that the user gave cannot be used; 130 stopped by Ctrl-C.
@@ -10,6 +10,7 @@ from typing import cast
 
 import typer
 
+from crowd.cli.export import export
 from crowd.cli.run import run
 from crowd.cli.showing import view
 from crowd.errors import CrowdError
@@ -29,6 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command()(run)
+app.command()(export)
 app.command()(view)
 
 
