@@ -34,6 +34,41 @@ class Limbs:
     radius: FloatArray
 
 
+@dataclass(frozen=True)
+class Mesh:
+    """A skin in rest pose.
+
+    Attributes
+    ----------
+    position, normal : (V, 3) float32
+        m, from the ground below the root.
+    joint : (V, 4) uint8
+    weight : (V, 4) float32
+        Share of each joint; they add up to 1.
+    triangle : (T, 3) uint32
+        Anticlockwise from outside.
+    """
+
+    position: Float32Array
+    normal: Float32Array
+    joint: npt.NDArray[np.uint8]
+    weight: Float32Array
+    triangle: npt.NDArray[np.uint32]
+
+
+@dataclass(frozen=True)
+class Body:
+    """One build of body: skins from fine to coarse, none or as many as there are mesh levels, and limbs."""
+
+    meshes: tuple[Mesh, ...]
+    limbs: Limbs
+
+
+def built_in_bodies(skeleton: Skeleton) -> tuple[Body, ...]:
+    """One body for each build; only limbs where the skeleton is not the built-in one."""
+    return (Body((), simple_limbs(skeleton)),)
+
+
 def rest_positions(skeleton: Skeleton) -> FloatArray:
     """Joints in rest pose, m. (J, 3)."""
     rest = np.zeros((skeleton.joint_count, 3))

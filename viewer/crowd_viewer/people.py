@@ -9,15 +9,19 @@ import numpy.typing as npt
 
 from crowd_kernels.view import REACH, levels_crowd, pack_crowd, sort_rows
 from crowd_viewer.bodies import (
+    HAND,
+    TRUNK,
+    Body,
+    Mesh,
+    built_in_bodies,
     flesh_segments,
     joint_parts,
     landmarks,
     rest_positions,
-    simple_limbs,
 )
 from crowd_viewer.frame import CrowdFrame, Scene
-from crowd_viewer.looks import LOOK_COLUMNS, draw_looks
-from crowd_viewer.programs import compile_program
+from crowd_viewer.looks import LOOK_COLUMNS, chance, draw_looks
+from crowd_viewer.programs import MOST_JOINTS, compile_program
 from crowd_viewer.quality import Quality
 from crowd_viewer.tables import Table
 
@@ -29,21 +33,28 @@ MESH_LEVELS = 3
 LEVELS = 5
 FEW_LIMBS = 13
 """Limbs of people who are far away: trunk, head, arms and legs."""
+BUILD_PURPOSE = 90
 PALETTE_UNIT, ROOTS_UNIT, LOOKS_UNIT, LIMBS_UNIT, SHADOW_UNIT = range(5)
 
 
 class People:
     """The crowd on the graphics side."""
 
-    def __init__(self, context: moderngl.Context, scene: Scene, quality: Quality) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        scene: Scene,
+        quality: Quality,
+        bodies: tuple[Body, ...] | None = None,
+    ) -> None:
         self.context = context
         self.scene = scene
         self.quality = quality
         self.picked = -1
         self.upload_bytes = 0
         count, skeleton = len(scene.stature), scene.skeleton
-        limbs = simple_limbs(skeleton)
-        self.build_count = 1
+        self.bodies = bodies or built_in_bodies(skeleton)
+        self.build_count = len(self.bodies)
         self._build = np.zeros(count, np.int32)
         self._level = np.full(count, -1, np.int32)
         self._begin = np.zeros(LEVELS * self.build_count + 1, np.int32)
@@ -51,7 +62,9 @@ class People:
         scale = scene.segment_scale[:, flesh_segments(skeleton)]
         self._joint_scale = np.rint(scale * (32767.0 / REACH)).astype(np.int16)
         self._every_joint = np.arange(skeleton.joint_count, dtype=np.int32)
-        self._few_joints = np.unique(limbs.joint).astype(np.int32)
+        self._few_joints = np.unique(np.concatenate([body.limbs.joint for body in self.bodies])).astype(
+            np.int32
+        )
         self._root = np.zeros((count, 8), np.float32)
         self._full = np.zeros((min(count, quality.mesh_count), 8 * skeleton.joint_count), np.int16)
         self._reduced = np.zeros((count, 8 * len(self._few_joints)), np.int16)
@@ -63,7 +76,8 @@ class People:
         self._look = np.zeros((count, LOOK_COLUMNS, 4), np.float32)
         self._height_factor = 1.0
         self._compile()
-        self._fill_limbs(limbs)
+        self._fill_limbs()
+        self._fill_meshes()
 
     # ---- what the camera sees
 
@@ -94,6 +108,7 @@ class People:
         """
         if not keeps_levels:
             self._level[:] = -1
+        self._update_looks(frame)
         self._choose_levels(frame, planes, eye, pixels_at_one_metre, is_perspective)
         drawn = self._drawn[: self._begin[-1]]
         mesh_count = self.count_of_meshes()
@@ -103,7 +118,6 @@ class People:
         self.upload_bytes = self._roots.write(self._root[: len(drawn)])
         self.upload_bytes += self._full_palette.write(self._full[:mesh_count])
         self.upload_bytes += self._reduced_palette.write(self._reduced[mesh_count : len(drawn)])
-        self._update_looks(frame)
 
     def _choose_levels(
         self, frame: CrowdFrame, planes: FloatArray, eye: FloatArray, pixels: float, is_perspective: bool
@@ -156,6 +170,8 @@ class People:
         changed = np.flatnonzero(frame.identity != self._identity)
         if changed.size:
             self._identity[changed] = frame.identity[changed]
+            builds = chance(frame.identity[changed], BUILD_PURPOSE) * self.build_count
+            self._build[changed] = builds.astype(np.int32)
             self._look[changed] = draw_looks(frame.identity[changed], self.scene.skeleton.stature)
             self._looks.write(self._look.reshape(len(self._look), -1))
 
@@ -177,11 +193,13 @@ class People:
     @property
     def has_meshes(self) -> bool:
         """There are bodies with a skin."""
-        return False
+        return all(len(body.meshes) == MESH_LEVELS for body in self.bodies)
 
     def draw(self, kind: str) -> None:
         """Draw everyone: ``"colour"``, ``"shadow"`` or ``"identity"``."""
         self._bind()
+        for bucket in range(MESH_LEVELS * self.build_count if self.has_meshes else 0):
+            self._draw_meshes(kind, bucket)
         near, far = (int(self._begin[k * self.build_count]) for k in (MESH_LEVELS, MESH_LEVELS + 1))
         self._draw_capsules(kind, near, far - near, self._limb_count)
         self._draw_capsules(kind, far, int(self._begin[-1]) - far, min(FEW_LIMBS, self._limb_count))
@@ -190,11 +208,25 @@ class People:
         """Darken the ground below the feet of all but those far away."""
         self._bind()
         near, far = (int(self._begin[k * self.build_count]) for k in (MESH_LEVELS, MESH_LEVELS + 1))
-        if far > near:
-            program = self._blob_program
-            program["feet"] = self._feet_reduced
-            self._set_rows(program, near, reduced=True)
-            self._blobs.render(self.context.TRIANGLE_STRIP, instances=2 * (far - near))
+        program = self._blob_program
+        for first, count, feet in ((0, near, self._feet), (near, far - near, self._feet_reduced)):
+            if count:
+                program["feet"] = feet
+                self._set_rows(program, first, reduced=first == near)
+                self._blobs.render(self.context.TRIANGLE_STRIP, instances=2 * count)
+
+    def _draw_meshes(self, kind: str, bucket: int) -> None:
+        first, count = int(self._begin[bucket]), int(self._begin[bucket + 1] - self._begin[bucket])
+        if count == 0:
+            return
+        level, build = divmod(bucket, self.build_count)
+        if kind == "shadow":
+            level = min(level + 1, MESH_LEVELS - 1)
+        program = self._mesh_programs[kind]
+        self._set_rows(program, first, reduced=False)
+        if "picked" in program:
+            program["picked"] = self.picked
+        self._meshes[kind, level, build].render(instances=count)
 
     def _draw_capsules(self, kind: str, first: int, count: int, limb_count: int) -> None:
         if count == 0:
@@ -248,29 +280,93 @@ class People:
             set_units(program)
             quads = context.vertex_array(program, [(self._corners, "2f4", "corner")])
             self._capsules[kind] = (program, quads)
+        self._mesh_programs = {}
+        for kind in ("colour", "shadow", "identity"):
+            program = compile_program(
+                context,
+                ("view.glsl", "people.glsl", "mesh.vert"),
+                ("view.glsl", "people.glsl", "lighting.glsl", "clothes.glsl", "mesh.frag"),
+                **constants,
+                **({} if kind == "colour" else {kind.upper(): ""}),
+            )
+            set_units(program)
+            rest = np.zeros((MOST_JOINTS, 3), np.float32)
+            rest[: self.scene.skeleton.joint_count] = rest_positions(self.scene.skeleton)
+            program["rest"].write(rest.tobytes())  # type: ignore[union-attr]
+            self._mesh_programs[kind] = program
         self._blob_program = compile_program(
             context, ("view.glsl", "people.glsl", "blob.vert"), ("blob.frag",), **constants
         )
         set_units(self._blob_program)
         self._blobs = context.vertex_array(self._blob_program, [(self._corners, "2f4", "corner")])
 
-    def _fill_limbs(self, limbs: Any) -> None:
-        """Write the limbs of all builds to a texture."""
+    def _fill_limbs(self) -> None:
+        """Write the limbs of all builds to a texture, one row a build; missing ones have no size."""
         skeleton = self.scene.skeleton
         rest, part = rest_positions(skeleton), joint_parts(skeleton)
-        place = np.searchsorted(self._few_joints, limbs.joint)
-        self._limb_count = len(limbs.joint)
-        table = np.zeros((self._limb_count, 3, 4), np.float32)
-        table[:, 0, :3] = limbs.start - rest[limbs.joint]
-        table[:, 0, 3] = limbs.radius
-        table[:, 1, :3] = limbs.end - rest[limbs.joint]
-        table[:, 1, 3] = place
-        table[:, 2, :3] = rest[limbs.joint]
-        table[:, 2, 3] = part[limbs.joint]
-        self._limbs = self.context.texture((3 * self._limb_count, 1), 4, table.tobytes(), dtype="f4")
+        self._limb_count = max(len(body.limbs.joint) for body in self.bodies)
+        table = np.zeros((self.build_count, self._limb_count, 3, 4), np.float32)
+        table[:, :, 0, 3] = 1e-6
+        for row, body in zip(table, self.bodies, strict=True):
+            limbs, filled = body.limbs, slice(0, len(body.limbs.joint))
+            row[filled, 0, :3] = limbs.start - rest[limbs.joint]
+            row[filled, 0, 3] = limbs.radius
+            row[filled, 1, :3] = limbs.end - rest[limbs.joint]
+            row[filled, 1, 3] = np.searchsorted(self._few_joints, limbs.joint)
+            row[filled, 2, :3] = rest[limbs.joint]
+            row[filled, 2, 3] = part[limbs.joint]
+        size = (3 * self._limb_count, self.build_count)
+        self._limbs = self.context.texture(size, 4, table.tobytes(), dtype="f4")
         self._limbs.filter = (self.context.NEAREST, self.context.NEAREST)
-        feet = [skeleton.joint(f"{side}_foot") for side in ("left", "right")]
-        self._feet_reduced = [int(np.searchsorted(self._few_joints, foot)) for foot in feet]
+        self._feet = [skeleton.joint(f"{side}_foot") for side in ("left", "right")]
+        self._feet_reduced = [int(np.searchsorted(self._few_joints, foot)) for foot in self._feet]
+
+    def _fill_meshes(self) -> None:
+        """Upload the skins of all builds and levels."""
+        self._meshes: dict[tuple[str, int, int], moderngl.VertexArray] = {}
+        parts = joint_parts(self.scene.skeleton)
+        for build, body in enumerate(self.bodies):
+            for level, mesh in enumerate(body.meshes):
+                vertices = self.context.buffer(vertex_bytes(mesh, parts))
+                triangles = self.context.buffer(np.ascontiguousarray(mesh.triangle, np.uint32).tobytes())
+                for kind, program in self._mesh_programs.items():
+                    layout = [
+                        (form if name in program else f"{size}x", name) for form, size, name in VERTEX_LAYOUT
+                    ]
+                    used = [name for form, name in layout if not form.endswith("x")]
+                    forms = " ".join(form for form, _ in layout)
+                    self._meshes[kind, level, build] = self.context.vertex_array(
+                        program, [(vertices, forms, *used)], triangles
+                    )
+
+
+VERTEX_LAYOUT = (
+    ("3f4", 12, "position"),
+    ("3f4", 12, "normal"),
+    ("4u1", 4, "joint"),
+    ("4f4", 16, "weight"),
+    ("2f4", 8, "part"),
+)
+
+
+def vertex_bytes(mesh: Mesh, parts: npt.NDArray[np.int32]) -> bytes:
+    """Vertices of a skin as `VERTEX_LAYOUT` says."""
+    part = parts[mesh.joint]
+    rows = np.zeros(
+        len(mesh.position),
+        [
+            ("position", "f4", 3),
+            ("normal", "f4", 3),
+            ("joint", "u1", 4),
+            ("weight", "f4", 4),
+            ("part", "f4", 2),
+        ],
+    )
+    rows["position"], rows["normal"] = mesh.position, mesh.normal
+    rows["joint"], rows["weight"] = mesh.joint, mesh.weight
+    rows["part"][:, 0] = (mesh.weight * (part != TRUNK)).sum(axis=1)
+    rows["part"][:, 1] = (mesh.weight * (part == HAND)).sum(axis=1)
+    return rows.tobytes()
 
 
 def set_units(program: Any) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import numpy.typing as npt
 
+from crowd_viewer.bodies import Body
 from crowd_viewer.camera import Camera, view_planes
 from crowd_viewer.frame import CrowdFrame, Scene
 from crowd_viewer.people import SHADOW_UNIT, People
@@ -37,10 +38,17 @@ class Renderer:
     size : tuple of int
         Width and height of pictures, pixels.
     quality : Quality
+    bodies : tuple of Body, optional
+        One for each build; the built-in ones when left out.
     """
 
     def __init__(
-        self, context: moderngl.Context, scene: Scene, size: tuple[int, int], quality: Quality = FINE
+        self,
+        context: moderngl.Context,
+        scene: Scene,
+        size: tuple[int, int],
+        quality: Quality = FINE,
+        bodies: tuple[Body, ...] | None = None,
     ) -> None:
         self.context = context
         self.scene = scene
@@ -49,7 +57,7 @@ class Renderer:
         self.origin = np.array([0.5 * (low_x + high_x), 0.0, 0.5 * (low_z + high_z)])
         self.targets = Targets(context, size, quality.samples)
         self.light = Light(context, quality)
-        self.people = People(context, scene, quality)
+        self.people = People(context, scene, quality, bodies)
         self.surroundings = Surroundings(context, scene, self.origin)
         self._view = context.buffer(reserve=192, dynamic=True)
 

@@ -37,6 +37,9 @@ void main() {
     across = vec2(corner.x, corner.y * (half_length / radius + 1.0));
     flat_place = middle + side * corner.x * radius + up * corner.y * (half_length + radius);
     bool is_up = dot(along, up) >= 0.0;
+    // The quad leans with the limb; one that points at the eye is drawn where its near end is.
+    float lean = 0.5 * dot(along, view), length_share = half_length / (half_length + radius);
+    flat_place += view * ((is_up ? lean : -lean) * corner.y * length_share + abs(lean) * (1.0 - length_share));
     start = vec4((is_up ? a.xyz : b.xyz) + c.xyz, half_length / radius);
     end = vec4((is_up ? b.xyz : a.xyz) + c.xyz, radius);
     limb = vec2(c.w == 1.0 || c.w == 2.0 ? 1.0 : 0.0, c.w == 2.0 ? 1.0 : 0.0);
