@@ -110,7 +110,7 @@ def flesh_segments(skeleton: Skeleton) -> npt.NDArray[np.int32]:
 
 
 def simple_limbs(skeleton: Skeleton) -> Limbs:
-    """Twenty-one capsules along the bones of the built-in skeleton."""
+    """Capsules along the bones of the built-in skeleton."""
     rest, unit = rest_positions(skeleton), skeleton.stature / 1.75
     rows: list[tuple[int, FloatArray, FloatArray, float]] = []
 
@@ -120,10 +120,12 @@ def simple_limbs(skeleton: Skeleton) -> Limbs:
     def at(joint: str, *offset: float) -> FloatArray:
         return np.asarray(rest[skeleton.joint(joint)] + unit * np.array(offset or (0.0, 0.0, 0.0)))
 
-    add("spine_3", at("spine_3", -0.055, 0.06, 0.005), at("spine_3", 0.055, 0.06, 0.005), 0.115)
-    add("spine_1", at("spine_1", -0.035, 0.0, 0.0), at("spine_1", 0.035, 0.0, 0.0), 0.112)
-    add("spine_2", at("spine_2", -0.04, 0.03, 0.0), at("spine_2", 0.04, 0.03, 0.0), 0.108)
-    add("pelvis", at("pelvis", -0.06, -0.01, -0.01), at("pelvis", 0.06, -0.01, -0.01), 0.115)
+    for sign in (1.0, -1.0):
+        add("spine_2", at("spine_1", 0.05 * sign, -0.03, 0.0), at("spine_3", 0.056 * sign, 0.0, 0.0), 0.097)
+        add("spine_3", at("spine_3", 0.058 * sign, 0.0, 0.0), at("spine_4", 0.066 * sign, 0.0, 0.0), 0.103)
+    add("spine_2", at("pelvis", 0.0, 0.0, 0.012), at("spine_3", 0.0, 0.03, 0.02), 0.092)
+    add("spine_4", at("spine_3", 0.0, 0.03, 0.018), at("spine_4", 0.0, 0.03, 0.014), 0.098)
+    add("pelvis", at("pelvis", -0.062, -0.01, -0.008), at("pelvis", 0.062, -0.01, -0.008), 0.108)
     add("head", at("head", 0.0, -0.005, 0.035), at("head", 0.0, 0.048, 0.018), 0.088)
     for side in ("left", "right"):
         add(f"{side}_thigh", at(f"{side}_thigh"), at(f"{side}_shank"), 0.072)

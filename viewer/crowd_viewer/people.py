@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 MESH_LEVELS = 3
 LEVELS = 5
-FEW_LIMBS = 13
+FEW_LIMBS = 12
 """Limbs of people who are far away: trunk, head, arms and legs."""
 BUILD_PURPOSE = 90
 PALETTE_UNIT, ROOTS_UNIT, LOOKS_UNIT, LIMBS_UNIT, SHADOW_UNIT = range(5)
@@ -202,6 +202,9 @@ class People:
             self._draw_meshes(kind, bucket)
         near, far = (int(self._begin[k * self.build_count]) for k in (MESH_LEVELS, MESH_LEVELS + 1))
         self._draw_capsules(kind, near, far - near, self._limb_count)
+        if kind == "shadow" and not self.quality.has_far_shadows:
+            return
+        kind = "far" if kind == "colour" else kind
         self._draw_capsules(kind, far, int(self._begin[-1]) - far, min(FEW_LIMBS, self._limb_count))
 
     def draw_blobs(self) -> None:
@@ -263,10 +266,10 @@ class People:
         corners = np.array([-1, -1, 1, -1, -1, 1, 1, 1], np.float32)
         self._corners = context.buffer(corners.tobytes())
         self._capsules = {}
-        for kind in ("colour", "shadow", "identity"):
-            kinds = {} if kind == "colour" else {kind.upper(): ""}
+        for kind, is_deep in (("colour", True), ("far", False), ("shadow", False), ("identity", True)):
+            kinds = {} if kind in ("colour", "far") else {kind.upper(): ""}
             towards = "sun.xyz" if kind == "shadow" else "towards_eye(middle)"
-            deep = {} if kind == "shadow" else {"DEEP": ""}
+            deep = {"DEEP": ""} if is_deep else {}
             program = compile_program(
                 context,
                 ("view.glsl", "people.glsl", "capsule.vert"),

@@ -21,7 +21,9 @@ class Quality:
     shadow_size : int
         Texels along each side of the shadow map; 0 without shadows.
     shadow_reach : float
-        Half of the side of the ground on which shadows fall, at most, m.
+        Half of the side of the ground on which shadows fall where people are near, m.
+    has_far_shadows : bool
+        People drawn with few capsules cast shadows too.
     """
 
     least_height: tuple[float, float, float, float]
@@ -29,9 +31,10 @@ class Quality:
     samples: int
     shadow_size: int
     shadow_reach: float
+    has_far_shadows: bool
 
 
-FINE = Quality((150.0, 70.0, 34.0, 14.0), 2000, 4, 4096, 45.0)
+FINE = Quality((150.0, 70.0, 34.0, 14.0), 2000, 4, 4096, 45.0, True)
 """For pictures, videos and graphics cards."""
-FAST = Quality((400.0, 260.0, 160.0, 26.0), 12, 0, 1024, 25.0)
+FAST = Quality((400.0, 260.0, 160.0, 26.0), 12, 0, 1024, 25.0, False)
 """For windows where the processor draws."""

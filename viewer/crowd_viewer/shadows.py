@@ -19,7 +19,7 @@ MARGIN = 2.5
 SPREAD = 0.022
 """Radius over which the rim of a shadow fades, m."""
 STAND_OFF = 0.02
-HALF_DEPTH = 90.0
+HALF_DEPTH = 400.0
 STEP = 1.15
 """The side of the map grows in steps of this factor, so that it rarely changes while people move."""
 
@@ -47,16 +47,19 @@ class Light:
         """Fit the map to people, (D, 3) m, those near the eye first."""
         if not self.is_on:
             return
-        near = seen[((seen - eye) ** 2).sum(axis=1) < (2.5 * self.reach) ** 2]
+        away = ((seen - eye) ** 2).sum(axis=1)
+        # Who is far away is small on the screen, and so are the steps of a coarser map.
+        reach = max(self.reach, 0.8 * float(np.sqrt(away.min()))) if len(seen) else self.reach
+        near = seen[away < (2.5 * reach) ** 2]
         if len(near) == 0:
-            near = np.asarray(eye + min(20.0, self.reach) * ahead, np.float32)[None] * [1.0, 0.0, 1.0]
+            near = np.asarray(eye + min(20.0, reach) * ahead, np.float32)[None] * [1.0, 0.0, 1.0]
         points = near @ self._axes.T
         low, high = points.min(axis=0), points.max(axis=0)
         wanted = max(0.5 * float((high - low)[:2].max()) + MARGIN, 4.0)
-        half = min(4.0 * STEP ** np.ceil(np.log(wanted / 4.0) / np.log(STEP)), self.reach)
+        half = min(4.0 * STEP ** np.ceil(np.log(wanted / 4.0) / np.log(STEP)), reach)
         middle = 0.5 * (low + high)
-        if wanted > self.reach:
-            closest = np.clip(self._axes @ (eye + 0.8 * self.reach * ahead * [1.0, 0.0, 1.0]), low, high)
+        if wanted > reach:
+            closest = np.clip(self._axes @ (eye + 0.8 * reach * ahead * [1.0, 0.0, 1.0]), low, high)
             middle[:2] = closest[:2]
         texel = 2.0 * half / self.size
         # Whole texels: shadows would crawl along their rims otherwise.

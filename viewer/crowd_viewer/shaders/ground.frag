@@ -33,14 +33,14 @@ void main() {
     float outside = max(beyond.x, beyond.y);
     float grain = mix(noise(at * 38.0), 0.5, smoothstep(0.008, 0.03, pixel));
     float patches = 0.6 * noise(at * 0.23) + 0.4 * noise(at * 1.1 + 7.0);
-    vec3 slab = vec3(0.335, 0.32, 0.295);
+    vec3 slab = vec3(0.285, 0.268, 0.242);
     slab *= 1.0 + 0.13 * (chance(ivec2(floor(at))) - 0.5) * smoothstep(0.6, 0.15, pixel);
     slab *= 0.90 + 0.14 * patches + 0.09 * (grain - 0.5);
     slab = mix(slab, slab * 0.55, joints(at, 1.0, 0.012) * exp(-pixel * 6.0));
     slab = mix(slab, slab * 0.62, joints(at, 5.0, 0.035));
-    vec3 lawn = mix(vec3(0.115, 0.165, 0.055), vec3(0.19, 0.215, 0.085), patches) * (0.86 + 0.28 * grain);
+    vec3 lawn = mix(vec3(0.075, 0.115, 0.035), vec3(0.125, 0.15, 0.055), patches) * (0.86 + 0.28 * grain);
     float edge = max(pixel, 0.002);
-    vec3 kerb = vec3(0.42, 0.41, 0.39) * (0.93 + 0.14 * grain);
+    vec3 kerb = vec3(0.37, 0.36, 0.34) * (0.93 + 0.14 * grain);
     vec3 base = mix(slab, kerb, smoothstep(-edge, edge, outside));
     base = mix(base, lawn, smoothstep(-edge, edge, outside - 0.18));
     vec3 light = SKY_LIGHT * 0.92 + SUN_LIGHT * sun.y * sunlight(place, vec3(0.0, 1.0, 0.0));

@@ -4,8 +4,8 @@ uniform sampler2DShadow shadow_map;
 const vec3 SUN_LIGHT = vec3(3.2, 2.85, 2.35);
 const vec3 SKY_LIGHT = vec3(0.46, 0.55, 0.70);
 const vec3 GROUND_LIGHT = vec3(0.25, 0.22, 0.18);
-const vec3 HORIZON = vec3(0.80, 0.88, 0.98);
-const float HAZE = 0.0045;
+const vec3 HORIZON = vec3(0.74, 0.86, 1.02);
+const float HAZE = 0.0016;
 const float EXPOSURE = 0.60;
 
 const vec2 TAPS[12] = vec2[](
@@ -27,7 +27,7 @@ float sunlight(vec3 place, vec3 normal) {
 
 vec3 sky(vec3 direction) {
     float height = max(direction.y, 0.0);
-    vec3 colour = mix(HORIZON, vec3(0.24, 0.42, 0.78), pow(height, 0.55));
+    vec3 colour = mix(HORIZON, vec3(0.16, 0.34, 0.78), pow(height, 0.5));
     float near_sun = max(dot(direction, sun.xyz), 0.0);
     return colour + vec3(1.0, 0.85, 0.6) * (0.25 * pow(near_sun, 12.0) + 6.0 * pow(near_sun, 1500.0));
 }
