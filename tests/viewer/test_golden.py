@@ -9,8 +9,8 @@ import pytest
 FOLDER = Path(__file__).parent / "pictures"
 SIZE = (640, 360)
 VIEWS = {
-    "near": ((2.0, 1.7, 6.5), (0.0, 0.9, 0.0)),
-    "middle": ((6.0, 5.0, 14.0), (0.0, 0.5, 0.0)),
+    "near": ((2.0, 1.7, -7.2), (0.4, 0.9, -14.0)),
+    "middle": ((7.0, 4.0, -2.5), (0.0, 0.5, -14.0)),
     "far": ((20.0, 18.0, 45.0), (0.0, 0.0, 0.0)),
 }
 LARGEST_BLOCK, LARGEST_MEAN = 6.0, 1.0
@@ -33,7 +33,7 @@ def standing(drawing):
     source = LiveSource(simulation)
     row = np.arange(25)
     position = np.zeros((25, 3))
-    position[:, 0], position[:, 2] = 1.6 * (row % 5 - 2) + 0.3 * (row // 5), 1.9 * (row // 5 - 2)
+    position[:, 0], position[:, 2] = 1.6 * (row % 5 - 2) + 0.3 * (row // 5), 1.9 * (row // 5 - 2) - 14.0
     joints = standing_joints(source.scene)
     frame = CrowdFrame(
         0.0,

@@ -33,15 +33,23 @@ def require_moderngl() -> None:
         raise ViewerError(describe("viewer", "moderngl is not installed", allowed=INSTALL)) from error
 
 
-@cache
 def headless_context() -> moderngl.Context:
-    """The process's context that needs no screen; made once, since drivers leak many contexts.
+    """The process's context that needs no screen, made current.
 
     Raises
     ------
     ViewerError
         There is no OpenGL 3.3; the simulation runs without.
     """
+    context = _only_context()
+    # A window may have taken its place since.
+    context.__enter__()  # type: ignore[no-untyped-call,unused-ignore]
+    return context
+
+
+@cache
+def _only_context() -> moderngl.Context:
+    """Make the context; once, since drivers leak many contexts."""
     require_moderngl()
     import moderngl
 

@@ -64,9 +64,10 @@ class Renderer:
     def resize(self, size: tuple[int, int]) -> None:
         """Draw pictures of another size from now on."""
         if size != self.targets.size:
-            samples = self.quality.samples
-            self.targets.release()
-            self.targets = Targets(self.context, size, samples)
+            before, self.targets = self.targets, Targets(self.context, size, self.quality.samples)
+            # moderngl returns to the framebuffer in use when it makes one: that may not be a deleted one.
+            self.targets.use_picture()
+            before.release()
 
     def draw(self, frame: CrowdFrame, camera: Camera, *, keeps_levels: bool = True) -> None:
         """Draw a frame into `targets.picture`."""

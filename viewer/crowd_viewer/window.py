@@ -110,6 +110,7 @@ class Window:
 
     def refresh(self) -> float:
         """Handle input and draw a picture; returns how much simulated time has gone by since, s."""
+        self._glfw.make_context_current(self.handle)
         self._glfw.poll_events()
         now = clock.perf_counter()
         wall, self._wall_time = now - self._wall_time, now
@@ -128,6 +129,7 @@ class Window:
     def close(self) -> None:
         """Close the window."""
         if self.handle is not None:
+            self._glfw.make_context_current(self.handle)
             self.renderer.release()
             self._glfw.destroy_window(self.handle)
             self.handle = None
@@ -204,6 +206,7 @@ class Window:
 
     def pick(self, x: float, y: float) -> int:
         """Pick whoever is seen at a pixel; returns the slot, or -1."""
+        self._glfw.make_context_current(self.handle)
         identity, _ = self.renderer.identities(self._frame, self.controls.camera)
         height, width = identity.shape
         column, row = min(max(int(x), 0), width - 1), min(max(int(y), 0), height - 1)
@@ -223,6 +226,7 @@ class Window:
         """Draw in another size; nothing is drawn while one side is 0."""
         self.size = (width, height)
         if width > 0 and height > 0:
+            self._glfw.make_context_current(self.handle)
             self.renderer.resize(self.size)
 
     def _fly(self, wall_seconds: float) -> None:
