@@ -101,3 +101,22 @@ def test_a_prism_is_closed_and_faces_outwards(drawing):
     assert ((normal * triangles[:, 0, 3:6]).sum(axis=1) > 0).all()
     # The divergence theorem: triangles that close a body hold its volume, less the slanted rim.
     assert (a * normal).sum() / 6.0 == pytest.approx(3.0, rel=0.02)
+
+
+def test_an_empty_recording_is_refused_and_one_cut_short_is_shown(drawing, tmp_path):
+    simulation = crowd.Simulation(crowd.load_scenario("plaza"), seed=3, characters=20, threads=1)
+    with Recorder(tmp_path / "empty.h5", simulation):
+        pass
+    with (
+        Recording(tmp_path / "empty.h5") as recording,
+        pytest.raises(drawing.ViewerError, match="the recording is empty"),
+    ):
+        drawing.render(recording, size=SIZE)
+    recorder = Recorder(tmp_path / "cut.h5", simulation, every=1)
+    for _ in range(70):
+        recorder.record(simulation.step())
+    # Never closed: the file ends with the last whole block.
+    with Recording(tmp_path / "cut.h5") as recording:
+        assert 0 < recording.frame_count <= 70
+        assert drawing.render(recording, size=SIZE).std() > 15
+    recorder.close()

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
+from crowd.errors import describe
 from crowd.joints import Joints
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.recorder import PELVIS, ROTATION, ROTATION_STEPS
@@ -19,6 +20,7 @@ from crowd.scenario import Scenario
 from crowd.simulation import Simulation
 from crowd.state import State
 from crowd_kernels.clip import PADDED_JOINTS
+from crowd_viewer.context import ViewerError
 from crowd_viewer.solids import Solid, scenario_solids, wall_solids
 
 FloatArray = npt.NDArray[np.float64]
@@ -92,7 +94,13 @@ class Source(Protocol):
 
 
 def source_of(shown: Simulation | Recording) -> Source:
-    """Frames of a simulation or a recording."""
+    """Frames of a simulation or a recording.
+
+    Raises
+    ------
+    ViewerError
+        The recording is empty.
+    """
     return LiveSource(shown) if isinstance(shown, Simulation) else ReplaySource(shown)
 
 
@@ -143,6 +151,8 @@ class ReplaySource:
     """Frames of a recording, between two recorded ones by interpolation."""
 
     def __init__(self, recording: Recording) -> None:
+        if recording.frame_count == 0:
+            raise ViewerError(describe(str(recording.path), "the recording is empty"))
         self.recording = recording
         scenario = recorded_scenario(recording)
         if scenario is not None:

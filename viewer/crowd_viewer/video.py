@@ -168,6 +168,7 @@ def film_recording(
 ) -> int:
     """Make a video of a whole recording; returns the number of its pictures."""
     source = ReplaySource(recording)
+    # A recording that was cut short simply ends earlier.
     times = np.arange(float(recording.time[0]), float(recording.time[-1]) + 1e-6, 1.0 / frames_per_second)
     chosen = camera or default_camera(source.scene, source.frame(float(times[0])), size)
     with (

@@ -381,8 +381,6 @@ def show(shown: Simulation | Recording, *, camera: Camera | None = None) -> None
         for _ in shown_frames(shown, 1 << 62, camera=camera):
             pass
         return
-    if shown.frame_count == 0:
-        raise ViewerError(describe(str(shown.path), "the recording is empty"))
     with Window(shown, camera=camera) as window:
         while window.is_open:
             window.refresh()
