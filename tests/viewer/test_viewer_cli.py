@@ -1,5 +1,6 @@
 """Pictures and videos from the command line."""
 
+import os
 import subprocess
 import sys
 
@@ -47,3 +48,13 @@ def test_the_viewer_is_loaded_only_when_something_is_shown():
     code = f"import crowd.cli, sys; print({loaded})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_without_a_screen_a_window_is_refused_before_the_run(drawing):
+    pytest.importorskip("glfw")
+    code = "from crowd.cli import main; main(['run', 'plaza', '--view'])"
+    bare = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=bare)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("--view: no screen to open a window on; allowed --picture")

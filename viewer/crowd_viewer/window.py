@@ -43,12 +43,17 @@ def require_glfw() -> Any:
     Raises
     ------
     ViewerError
-        It is not installed.
+        It is not installed, or there is no screen.
     """
     try:
         import glfw
     except ImportError as error:
         raise ViewerError(describe("--view", "glfw is not installed", allowed=INSTALL)) from error
+    # Errors become ours, not warnings beside them.
+    glfw.ERROR_REPORTING = "ignore"
+    if not glfw.init():
+        allowed = "--picture, --video or --record"
+        raise ViewerError(describe("--view", "no screen to open a window on", allowed=allowed))
     return glfw
 
 
@@ -304,10 +309,6 @@ class Window:
 
     def _open(self, size: tuple[int, int], name: str) -> tuple[Any, moderngl.Context]:
         glfw = self._glfw
-        if not glfw.init():
-            raise ViewerError(
-                describe("--view", "no screen to open a window on", allowed="--picture, --video or --record")
-            )
         glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
         glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
         glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
