@@ -32,7 +32,7 @@ from crowd.scenario.schema import Bound
         ),
         (
             ["run", "plaza", "--motions", "here"],
-            "--motions: motion libraries cannot be read in this version; ",
+            "here: no such motion library; `crowd motions import` makes one",
         ),
         (["run", "plaza", "--record", "/"], "--record: is a folder; got '/'"),
         (["run", "plaza", "--metrics", "/no/m.json"], "--metrics: there is no such folder; got '/no'"),
