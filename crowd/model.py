@@ -1,11 +1,14 @@
 """The model: everything a run reads and never changes, packed into arrays, and the world it happens in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from crowd.blending.parameter_space import ParameterSpace
+from crowd.characters import Cast
 from crowd.errors import MotionError, describe
 from crowd.motion.clip import ClipKind
 from crowd.motion.clip_table import ClipTable
@@ -39,6 +42,8 @@ class Model:
         Starts, traits, goals and plays.
     people : People
         Bodies.
+    cast : Cast
+        Skinned characters that people are drawn as.
     world : World
         Walls and walkable grid; obstacles may come and go.
     timetable : TimedObstacles
@@ -51,6 +56,7 @@ class Model:
     idle_clips: IntArray
     placed: PlacedCharacters
     people: People
+    cast: Cast
     world: World
     timetable: TimedObstacles
 
@@ -61,6 +67,7 @@ class Model:
         seed: int,
         motions: MotionLibrary | None = None,
         characters: int | None = None,
+        character_files: Sequence[Path] = (),
     ) -> "Model":
         """Place people, build the world and pack the motion library.
 
@@ -90,6 +97,7 @@ class Model:
             np.array(idle, np.int32),
             placed,
             People.build(library.skeleton, placed.radius, placed.preferred_speed, placed.stature, seed),
+            Cast.build(scenario, placed, seed, character_files),
             world,
             timetable,
         )

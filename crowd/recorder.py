@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any, Self
 import h5py
 import numpy as np
 
+from crowd.characters import Cast
+from crowd.characters.character_file import write_character
 from crowd.errors import RecordingError, SettingsError, describe
 from crowd.scenario.geometry import wall_segments
 
@@ -259,6 +261,7 @@ class Recorder:
         people.create_dataset("name", data=list(model.placed.name), dtype=text)
         for name in ("radius", "preferred_speed", "stature", "segment_scale"):
             people.create_dataset(name, data=getattr(model.people, name))
+        _write_cast(file, model.cast)
         world = file.create_group("world")
         for name, values in wall_segments(scenario.world).items():
             world.create_dataset(name, data=values)
@@ -296,6 +299,16 @@ def _fields_of(simulation: Simulation) -> dict[str, Field]:
         )
         fields[PELVIS] = Field(np.float32, (3,), "pelvis in the root frame, m")
     return fields
+
+
+def _write_cast(file: h5py.File, cast: Cast) -> None:
+    """Write the characters that people are drawn as, if there are any."""
+    if not cast.characters:
+        return
+    group = file.create_group("cast")
+    group.create_dataset("number", data=cast.number)
+    for number, character in enumerate(cast.characters):
+        write_character(group.create_group(f"{number:03d}"), character)
 
 
 def _version() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,6 +14,8 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
+from crowd.characters import Cast
+from crowd.characters.character_file import read_character
 from crowd.errors import RecordingError, describe
 from crowd.motion.rotation import about, multiply, rotate
 from crowd.motion.skeleton import Skeleton
@@ -128,6 +131,20 @@ class Recording:
     def frame_seconds(self) -> float:
         """Time from one recorded frame to the next, s."""
         return self.dt * self.every
+
+    @cached_property
+    def cast(self) -> Cast:
+        """Skinned characters that people are drawn as."""
+        if "cast" not in self._file:
+            return Cast.of_nobody(self.character_count)
+        group = self._file["cast"]
+        try:
+            characters = tuple(read_character(group[name]) for name in group if name != "number")
+            return Cast(characters, group["number"][:])
+        except (KeyError, ValueError, OSError, RuntimeError) as error:
+            raise RecordingError(
+                describe(str(self.path), "its characters are damaged", reason(error))
+            ) from error
 
     def read(self, name: str, frames: Rows = slice(None)) -> AnyArray:
         """Read a quantity, named as in `State`.

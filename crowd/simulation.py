@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -67,6 +68,8 @@ class Simulation:
         The built-in library when left out.
     characters : int, optional
         Number of people, instead of the scenario's own.
+    character_files : sequence of path
+        Skinned glTF characters for people to whom the scenario gives none; each draws one.
     bodies : {"people", "discs"}
         ``"discs"`` moves plain discs by avoidance alone, without animation: the comparison for benchmarks.
     is_threaded : bool, optional
@@ -81,6 +84,7 @@ class Simulation:
         threads: int | None = None,
         motions: MotionLibrary | None = None,
         characters: int | None = None,
+        character_files: Sequence[str | os.PathLike[str]] = (),
         bodies: Literal["people", "discs"] = "people",
         is_threaded: bool | None = None,
     ) -> None:
@@ -89,7 +93,9 @@ class Simulation:
         self.bodies = bodies
         self.dt = scenario.dt
         self.step_index = 0
-        self.model = Model.build(scenario, seed, motions, characters)
+        self.model = Model.build(
+            scenario, seed, motions, characters, [Path(file) for file in character_files]
+        )
         capacity = self.model.capacity
         is_threaded = capacity >= SERIAL_BELOW if is_threaded is None else is_threaded
         self.threads = thread_count(threads) if is_threaded else 1

@@ -21,8 +21,8 @@ from crowd.motion.formats.gltf import (
     skin_joints,
     world_of,
 )
-from crowd.motion.importing.joint_names import JointMap, map_joints, read_mapping
-from crowd.motion.importing.joint_shape import map_by_shape
+from crowd.motion.importing.joint_names import JointMap, read_mapping
+from crowd.motion.importing.joint_shape import recognise
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -30,6 +30,7 @@ IntArray = npt.NDArray[np.int32]
 
 TRIANGLES = 4
 LEAST_WEIGHT = 1e-6
+MAPPING_SUFFIX = ".joints.toml"
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,8 @@ def load_character(path: Path | str, mapping: Path | None = None) -> Character:
     path : path
         ``.gltf`` or ``.glb``.
     mapping : Path, optional
-        File that says which joint is which; otherwise names tell, then the shape of the skeleton.
+        File that says which joint is which. When left out, one called ``NAME.joints.toml`` beside the
+        character is; otherwise names tell, then the shape of the skeleton.
 
     Raises
     ------
@@ -129,23 +131,14 @@ def load_character(path: Path | str, mapping: Path | None = None) -> Character:
     parts = tuple(_parts(document, nodes))
     if not parts:
         raise MotionError(describe(str(place), "has no mesh on its skin"))
-    joints = _mapped(place, names, parent, rest[:, :3, 3], mapping)
+    beside = place.with_suffix(MAPPING_SUFFIX)
+    mapping = beside if mapping is None and beside.is_file() else mapping
+    joints = (
+        recognise(names, parent, rest[:, :3, 3], str(place))
+        if mapping is None
+        else read_mapping(mapping, names)
+    )
     return Character(place.stem, place, names, parent, rest, _inverse_bind(document, nodes), joints, parts)
-
-
-def _mapped(
-    path: Path, names: tuple[str, ...], parent: IntArray, rest: FloatArray, mapping: Path | None
-) -> JointMap:
-    """Joints by a mapping file, by names, or else by shape."""
-    if mapping is not None:
-        return read_mapping(mapping, names)
-    try:
-        return map_joints(names, str(path))
-    except MotionError as by_name:
-        try:
-            return map_by_shape(names, parent, rest, str(path))
-        except MotionError:
-            raise by_name from None
 
 
 def _inverse_bind(document: Document, nodes: Sequence[int]) -> FloatArray:

@@ -15,7 +15,10 @@ from crowd.motion.skeleton import Skeleton
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
-STRETCH = 0.9995
+STRETCH, REACH = 0.9995, 0.999
+"""Shares of its length to which a leg is stretched at most, and up to which the body sinks instead."""
+MOST_ACROSS = 0.9
+"""Feet farther aside than this share of a leg are not followed."""
 CARRIED = {"shank": "thigh", "foot": "shank", "toe": "foot", "forearm": "upper_arm", "hand": "forearm"}
 """Joints that hang on another one of a person, whatever they hang on in the file."""
 
@@ -33,7 +36,8 @@ class Driver:
     -----
     Rotations are carried over in world space against both rest poses, as imports do it the other way round.
     A character is scaled to the leg length of the person that it stands for, so that its feet stay where
-    foot locks put them; thighs and shanks then bend to meet the ankles.
+    foot locks put them; thighs and shanks then bend to meet the ankles, and the body sinks where they would
+    not reach.
     """
 
     def __init__(self, character: Character, skeleton: Skeleton) -> None:
@@ -126,10 +130,29 @@ class Driver:
         scale = leg / self.leg_length
         turned = self._rotations(rotation_world)
         position = self._positions(turned, scale, position_world)
+        drop = self._drop(position, scale, position_world)
+        position[..., 1] -= drop[:, None]
         for side in SIDES:
             self._bend_leg(turned, position, side, scale, position_world)
         position = self._positions(turned, scale, position_world)
+        position[..., 1] -= drop[:, None]
         return turned, position, scale
+
+    def _drop(self, position: FloatArray, scale: FloatArray, position_world: FloatArray) -> FloatArray:
+        """How far the body sinks, m, (N,), so that both legs reach the person's ankles.
+
+        Hips wider or narrower than the person's are farther from the feet.
+        """
+        joints = self.character.joints.joint
+        longest = REACH * self.leg_length * scale
+        drop = np.zeros(len(position))
+        for side in SIDES:
+            way = (
+                position_world[:, self.skeleton.joint(f"{side}_foot")] - position[:, joints[f"{side}_thigh"]]
+            )
+            across = np.minimum(np.hypot(way[:, 0], way[:, 2]), MOST_ACROSS * longest)
+            drop = np.maximum(drop, -way[:, 1] - np.sqrt(longest**2 - across**2))
+        return drop
 
     def _rotations(self, rotation_world: FloatArray) -> FloatArray:
         """World rotations against the rest pose; joints without a role turn with their parent."""

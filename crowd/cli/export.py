@@ -18,7 +18,7 @@ def export(
     start: Annotated[float | None, typer.Option(help="Simulated time of the first frame, s.")] = None,
     stop: Annotated[float | None, typer.Option(help="Simulated time of the last frame, s.")] = None,
     character: Annotated[
-        list[Path] | None, typer.Option(help="Skinned glTF character for gltf and usd; may be repeated.")
+        list[Path] | None, typer.Option(help="gltf, usd: character instead of the recorded ones; repeat it.")
     ] = None,
     eye: Annotated[str, typer.Option(help="coco: camera, x,y,z, m.")] = "0,6,-16",
     target: Annotated[str, typer.Option(help="coco: what the camera looks at, x,y,z, m.")] = "0,1,0",

@@ -38,6 +38,9 @@ def run(
     motions: Annotated[
         Path | None, typer.Option(help="Motion library made by `crowd motions import`.")
     ] = None,
+    character: Annotated[
+        list[Path] | None, typer.Option(help="Skinned glTF character to draw people as; may be repeated.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show the run in a window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Write a video.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Write a picture of the last frame.")] = None,
@@ -61,7 +64,7 @@ def run(
     require_folder("--metrics", metrics)
     loaded = load_scenario(scenario)
     library = None if motions is None else load_library(motions)
-    simulation, compile_seconds = _prepare(loaded, seed, threads, characters, library)
+    simulation, compile_seconds = _prepare(loaded, seed, threads, characters, library, character or [])
     sinks = [sink for sink in (_open_recorder(record, simulation), film(video, simulation)) if sink]
     wall_seconds, was_stopped = _advance(simulation, sinks, seconds, is_shown=view)
     draw_picture(picture, simulation)
@@ -85,6 +88,7 @@ def _prepare(
     threads: int | None,
     characters: int | None,
     library: MotionLibrary | None,
+    character_files: Sequence[Path],
 ) -> tuple[Simulation, float]:
     """Compile kernels with a progress line and build the simulation; also returns compile time, s."""
     from rich.console import Console
@@ -94,7 +98,12 @@ def _prepare(
     console = Console(stderr=True)
     with console.status("placing people") as status:
         simulation = crowd.Simulation(
-            scenario, seed=seed, threads=threads, characters=characters, motions=library
+            scenario,
+            seed=seed,
+            threads=threads,
+            characters=characters,
+            motions=library,
+            character_files=character_files,
         )
         begin = time.perf_counter()
         crowd.warm_up(

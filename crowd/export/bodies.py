@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,6 +104,40 @@ class CharacterBody:
 
 
 Body = StickBody | CharacterBody
+
+
+class Bodies:
+    """The body of each person of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its people keep the characters that they were recorded with; others are sticks.
+    characters : sequence of Character
+        Given to people in turn by slot instead.
+    """
+
+    def __init__(self, recording: Recording, characters: Sequence[Character] = ()) -> None:
+        cast = recording.cast
+        self._number = np.arange(recording.character_count) % len(characters) if characters else cast.number
+        self._characters = tuple(characters) or cast.characters
+        self._skeleton = recording.skeleton
+        self._made: dict[int, Body] = {}
+
+    def number(self, slot: int) -> int:
+        """Which body a person has; -1 for sticks."""
+        return int(self._number[slot])
+
+    def of(self, slot: int) -> Body:
+        """The body of a person."""
+        number = self.number(slot)
+        if number not in self._made:
+            self._made[number] = (
+                StickBody(self._skeleton)
+                if number < 0
+                else CharacterBody(self._characters[number], self._skeleton)
+            )
+        return self._made[number]
 
 
 def _rest_positions(skeleton: Skeleton) -> FloatArray:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from crowd.characters import Character
 from crowd.errors import SettingsError, describe, nearest_first
-from crowd.export.bodies import Body, CharacterBody, StickBody
+from crowd.export.bodies import Bodies
 from crowd.export.coco import PictureCamera
 from crowd.export.selection import Selection
 
@@ -30,7 +30,8 @@ class ExportSettings:
     Attributes
     ----------
     characters : sequence of Character
-        Skinned characters for glTF and USD, given to people in turn; sticks when empty.
+        Skinned characters for glTF and USD, given to people in turn; when empty, people keep those that they
+        were recorded with, and the others are sticks.
     camera : PictureCamera
         For COCO.
     """
@@ -67,11 +68,6 @@ def export(
         A file cannot be read or written.
     """
     told = settings or ExportSettings()
-    skeleton = selection.recording.skeleton
-
-    def bodies() -> list[Body]:
-        return [CharacterBody(character, skeleton) for character in told.characters] or [StickBody(skeleton)]
-
     match format_name:
         case "bvh":
             from crowd.export.bvh import export_bvh
@@ -80,11 +76,11 @@ def export(
         case "gltf":
             from crowd.export.gltf import export_gltf
 
-            export_gltf(selection, out, on_block, bodies())
+            export_gltf(selection, out, on_block, Bodies(selection.recording, told.characters))
         case "usd":
             from crowd.export.usd import export_usd
 
-            export_usd(selection, out, on_block, bodies())
+            export_usd(selection, out, on_block, Bodies(selection.recording, told.characters))
         case "jupedsim":
             from crowd.export.jupedsim import export_jupedsim
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.characters import MeshPart
-from crowd.export.bodies import Body
+from crowd.export.bodies import Bodies, Body
 from crowd.export.output import whole_folder
 from crowd.export.selection import Selection, Visit
 
@@ -29,9 +29,7 @@ COMPONENTS = {
 }
 
 
-def export_gltf(
-    selection: Selection, out: Path, on_block: Callable[[float], None], bodies: Sequence[Body]
-) -> None:
+def export_gltf(selection: Selection, out: Path, on_block: Callable[[float], None], bodies: Bodies) -> None:
     """Write a folder of GLB files: nodes for joints, a skin, and an animation.
 
     Parameters
@@ -41,14 +39,12 @@ def export_gltf(
         Folder; files are called after the visits.
     on_block : callable
         Called with the number of frames after each block, shared among the people.
-    bodies : sequence of Body
-        Given to people in turn by slot.
+    bodies : Bodies
     """
     visits = selection.visits
     with whole_folder(out) as folder:
         for visit in visits:
-            body = bodies[visit.slot % len(bodies)]
-            write_person(selection, visit, body, folder / f"{visit.name}.glb")
+            write_person(selection, visit, bodies.of(visit.slot), folder / f"{visit.name}.glb")
             on_block(selection.frame_count / max(len(visits), 1))
 
 

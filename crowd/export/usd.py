@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import SettingsError, describe
-from crowd.export.bodies import Body
+from crowd.export.bodies import Bodies, Body
 from crowd.export.output import whole_file
 from crowd.export.selection import Selection, Visit
 
 AnyArray = npt.NDArray[Any]
 
 
-def export_usd(
-    selection: Selection, out: Path, on_block: Callable[[float], None], bodies: Sequence[Body]
-) -> None:
+def export_usd(selection: Selection, out: Path, on_block: Callable[[float], None], bodies: Bodies) -> None:
     """Write one USD file: y up, metres, a time code for each frame.
 
     Parameters
@@ -29,8 +27,7 @@ def export_usd(
         ``.usdc`` (compact), ``.usd`` or ``.usda`` (text).
     on_block : callable
         Called with the number of frames after each block.
-    bodies : sequence of Body
-        Given to people in turn by slot.
+    bodies : Bodies
 
     Raises
     ------
@@ -55,13 +52,13 @@ def export_usd(
         stage.SetStartTimeCode(0)
         stage.SetEndTimeCode(selection.frame_count - 1)
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Crowd").GetPrim())
-        used = sorted({visit.slot % len(bodies) for visit in selection.visits})
-        for number in used:
-            _prototype(stage, bodies[number], number)
-        people = [_instance(stage, visit, visit.slot % len(bodies)) for visit in selection.visits]
+        stage.CreateClassPrim("/Bodies")
+        for slot in {bodies.number(visit.slot): visit.slot for visit in selection.visits}.values():
+            _prototype(stage, bodies.of(slot), place_of(bodies, slot))
+        people = [_instance(stage, visit, place_of(bodies, visit.slot)) for visit in selection.visits]
         for block in selection.blocks(1):
             for visit, person in zip(selection.visits, people, strict=True):
-                _animate(selection, visit, bodies[visit.slot % len(bodies)], person, block)
+                _animate(selection, visit, bodies.of(visit.slot), person, block)
             # What is saved is read back from the file when asked for, so that memory does not grow.
             stage.GetRootLayer().Save()
             on_block(block.stop - block.start)
@@ -69,12 +66,16 @@ def export_usd(
         del stage
 
 
-def _prototype(stage: Any, body: Body, number: int) -> None:
+def place_of(bodies: Bodies, slot: int) -> str:
+    """Where the body of a person stands in the stage."""
+    number = bodies.number(slot)
+    return "/Bodies/sticks" if number < 0 else f"/Bodies/body_{number}"
+
+
+def _prototype(stage: Any, body: Body, place: str) -> None:
     """A hidden body that people are instances of."""
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-    stage.CreateClassPrim("/Bodies")
-    place = f"/Bodies/body_{number}"
     root = UsdSkel.Root.Define(stage, place)
     skeleton = UsdSkel.Skeleton.Define(stage, f"{place}/Skeleton")
     paths = joint_paths(body)
@@ -116,14 +117,14 @@ def joint_paths(body: Body) -> list[str]:
     return paths
 
 
-def _instance(stage: Any, visit: Visit, number: int) -> Any:
+def _instance(stage: Any, visit: Visit, place: str) -> Any:
     """A person: an instance of its body with an animation of its own."""
     from pxr import Sdf, UsdGeom, UsdSkel
 
     animation = UsdSkel.Animation.Define(stage, f"/Crowd/Animations/{visit.name}")
     root = UsdSkel.Root.Define(stage, f"/Crowd/{visit.name}")
     prim = root.GetPrim()
-    prim.GetReferences().AddInternalReference(Sdf.Path(f"/Bodies/body_{number}"))
+    prim.GetReferences().AddInternalReference(Sdf.Path(place))
     prim.SetInstanceable(True)
     binding = UsdSkel.BindingAPI.Apply(prim)
     binding.CreateAnimationSourceRel().SetTargets([animation.GetPath()])

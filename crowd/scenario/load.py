@@ -140,7 +140,7 @@ def read_toml(path: Path) -> Scenario:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(_toml_problem(path, str(error))) from error
-    source = ScenarioSource(path.name, text, partial(key_lines, text))
+    source = ScenarioSource(path.name, text, path.parent, partial(key_lines, text))
     content.setdefault("name", path.stem)
     return scenario_from(content, source)
 

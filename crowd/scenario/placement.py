@@ -77,6 +77,8 @@ class PlacedCharacters:
         ``"regions[0][17]"`` where nobody gave a name; for messages.
     location : tuple of location
         Table of the scenario that each person comes from, such as ``("regions", 0)``.
+    key : (N,) int64
+        Stable number of each person for draws, whoever else is there.
     position_world : (N, 3) float64
         Start, m. For slots of flows, the middle of the source.
     yaw : (N,) float64
@@ -108,6 +110,7 @@ class PlacedCharacters:
 
     name: tuple[str, ...]
     location: tuple[Location, ...]
+    key: IntArray
     position_world: FloatArray
     yaw: FloatArray
     radius: FloatArray
@@ -360,6 +363,7 @@ class _Builder:
         return PlacedCharacters(
             name=tuple(person.name for person in people),
             location=tuple(person.location for person in people),
+            key=np.array([person.key for person in people], np.int64),
             position_world=position_world,
             yaw=yaw,
             radius=np.array([person.radius for person in people], np.float64),

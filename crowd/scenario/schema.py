@@ -143,6 +143,17 @@ def _one_of(*words: str) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+def _tuple_of_text(value: Any) -> Any:
+    """Accept one text or a list of them."""
+    found = (value,) if isinstance(value, str) else value
+    if not isinstance(found, list | tuple) or not all(isinstance(name, str) and name for name in found):
+        raise refuse(
+            "is no file", 'a file in quotes, or a list of them; "built-in" is the engine\'s own body'
+        )
+    return tuple(found)
+
+
+CharacterFiles = Annotated[tuple[str, ...], BeforeValidator(_tuple_of_text)]
 RadiusSpread = Annotated[Spread, BeforeValidator(_spread_of_number), _spread_within(0.1, 2.0, "m")]
 SpeedSpread = Annotated[Spread, BeforeValidator(_spread_of_number), _spread_within(0.05, 8.0, "m/s")]
 StatureSpread = Annotated[Spread, BeforeValidator(_spread_of_number), _spread_within(1.0, 2.3, "m")]
@@ -247,7 +258,7 @@ class Goal(Table):
 
 
 class GoalList(Table):
-    """Goals and what happens at their end; shared by individuals, regions and flows."""
+    """What individuals, regions and flows have in common: goals, gestures, and what people are drawn as."""
 
     goals: tuple[Goal, ...] = ()
     """Done one after the other; without goals people stand."""
@@ -257,6 +268,9 @@ class GoalList(Table):
     """Clips of the motion library that are played now and then, in random order."""
     gesture_every: Positive = 8.0
     """Mean time from one gesture to the next, s, > 0."""
+    character: CharacterFiles = ()
+    """Skinned glTF file that they are drawn and exported as, beside the scenario; or a list, from which each
+    person draws one. ``"built-in"`` is the engine's own body."""
     name: str | None = None
     """For messages and for `plays`."""
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 from crowd.errors import ScenarioError, describe
 
@@ -33,12 +34,15 @@ class ScenarioSource:
         File name for messages; ``"scenario"`` for one that was made in Python.
     text : str
         The file's whole text.
+    folder : Path
+        Where files that the scenario names are looked for.
     find_lines : callable, optional
         Finds the line of each key, from 1, when a message needs them.
     """
 
     label: str = "scenario"
     text: str = ""
+    folder: Path = Path()
     find_lines: Callable[[], Mapping[Location, int]] | None = None
 
     @cached_property

@@ -128,7 +128,9 @@ class _Reader:
     ) -> Scenario:
         from crowd.scenario.load import scenario_from
 
-        source = ScenarioSource(self.label, data.decode("utf-8", errors="replace"), lambda: self.lines)
+        source = ScenarioSource(
+            self.label, data.decode("utf-8", errors="replace"), find_lines=lambda: self.lines
+        )
         bounds = {
             "x": (self.bounds["xmin"], self.bounds["xmax"]),
             "z": (self.bounds["zmin"], self.bounds["zmax"]),

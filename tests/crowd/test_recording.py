@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
+from crowd.characters import Cast
 from crowd.errors import RecordingError, SettingsError
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.recording import STATE_FIELDS, Recorder, Recording
@@ -50,7 +51,9 @@ class SmallRun:
             segment_scale=self.rng.uniform(0.9, 1.1, (count, len(Segment))).astype(np.float32),
         )
         placed = SimpleNamespace(name=tuple(f"person {row}" for row in range(count)))
-        self.model = SimpleNamespace(skeleton=small_skeleton(), people=people, placed=placed)
+        self.model = SimpleNamespace(
+            skeleton=small_skeleton(), people=people, placed=placed, cast=Cast.of_nobody(count)
+        )
 
     def frame(self, index: int) -> Any:
         """Draw a new state."""
@@ -208,7 +211,8 @@ def run_writer(body: str, path: Path) -> subprocess.CompletedProcess[str]:
         """
         import os, resource, signal, sys
         from test_recording import SmallRun
-        from crowd.errors import RecordingError
+        from crowd.characters import Cast
+from crowd.errors import RecordingError
         from crowd.recording import Recorder
         run = SmallRun(count=40)
         recorder = Recorder(sys.argv[1], run, every=1)

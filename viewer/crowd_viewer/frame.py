@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
+from crowd.characters import Cast
 from crowd.errors import describe
 from crowd.joints import Joints
 from crowd.motion.skeleton import Segment, Skeleton
@@ -74,6 +75,8 @@ class Scene:
         Lowest and highest x, lowest and highest z of the ground, m.
     solids : tuple of Solid
         Walls and obstacles.
+    cast : Cast
+        Characters of the user's that people are drawn as.
     """
 
     name: str
@@ -82,6 +85,7 @@ class Scene:
     segment_scale: Float32Array
     bounds: tuple[float, float, float, float]
     solids: tuple[Solid, ...]
+    cast: Cast
 
 
 class Source(Protocol):
@@ -125,6 +129,7 @@ class LiveSource:
             model.people.segment_scale,
             bounds,
             tuple(scenario_solids(scenario.world)),
+            model.cast,
         )
         self._standing: Joints | None = None
 
@@ -170,6 +175,7 @@ class ReplaySource:
             recording.segment_scale,
             bounds,
             solids,
+            recording.cast,
         )
         self._pose = State.create(recording.character_count)
         self._joints = standing_joints(self.scene)

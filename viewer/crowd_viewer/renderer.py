@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from crowd_viewer.bodies import Body
 from crowd_viewer.camera import Camera, view_planes
+from crowd_viewer.characters import Characters
 from crowd_viewer.frame import CrowdFrame, Scene
 from crowd_viewer.people import SHADOW_UNIT, People
 from crowd_viewer.programs import VIEW_BINDING
@@ -58,6 +60,7 @@ class Renderer:
         self.targets = Targets(context, size, quality.samples)
         self.light = Light(context, quality)
         self.people = People(context, scene, quality, bodies)
+        self.characters = Characters(context, scene, quality)
         self.surroundings = Surroundings(context, scene, self.origin)
         self._view = context.buffer(reserve=192, dynamic=True)
 
@@ -99,6 +102,7 @@ class Renderer:
         context.enable_only(context.DEPTH_TEST)
         self.surroundings.draw_solids(frame.time, is_plain=True)
         self.people.draw("identity")
+        self.characters.draw("identity")
         return targets.read_identity(), self._metres(targets.read_depth())
 
     def release(self) -> None:
@@ -106,6 +110,7 @@ class Renderer:
         self.targets.release()
         self.light.release()
         self.people.release()
+        self.characters.release()
 
     def __enter__(self) -> Self:
         return self
@@ -125,16 +130,21 @@ class Renderer:
         self._projection = projection
         self._to_clip = projection @ camera.view(self.origin)
         self._eye = np.asarray(camera.eye) - self.origin
+        planes = view_planes(projection @ camera.view(np.zeros(3)))
+        eye, pixels = np.asarray(camera.eye, np.float64), camera.pixels_at_one_metre(height)
+        is_perspective = camera.is_perspective
+        left = self.characters.update(frame, planes, eye, pixels, self.origin, is_perspective=is_perspective)
         self.people.update(
-            frame,
-            view_planes(projection @ camera.view(np.zeros(3))),
-            np.asarray(camera.eye, np.float64),
-            camera.pixels_at_one_metre(height),
+            replace(frame, is_active=left),
+            planes,
+            eye,
+            pixels,
             self.origin,
-            is_perspective=camera.is_perspective,
+            is_perspective=is_perspective,
             keeps_levels=keeps_levels,
         )
-        self.light.aim(self.people.seen_positions(), self._eye, camera.axes()[2])
+        seen = np.concatenate([self.people.seen_positions(), self.characters.seen_positions()])
+        self.light.aim(seen, self._eye, camera.axes()[2])
 
     def _write_view(self, to_clip: FloatArray) -> None:
         ahead = self.camera.axes()[2]
@@ -164,6 +174,7 @@ class Renderer:
         context.enable_only(context.DEPTH_TEST)
         self.surroundings.draw_solids(frame.time, is_plain=True)
         self.people.draw("shadow")
+        self.characters.draw("shadow")
 
     def _draw_colours(self, frame: CrowdFrame) -> None:
         context = self.context
@@ -176,6 +187,8 @@ class Renderer:
         if self.quality.samples:
             context.enable_direct(ALPHA_TO_COVERAGE)
         self.people.draw("colour")
+        self.characters.picked = self.people.picked
+        self.characters.draw("colour")
         if self.quality.samples:
             context.disable_direct(ALPHA_TO_COVERAGE)
         self.surroundings.draw_ground(self._eye)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from crowd.errors import MotionError, describe
 from crowd.motion.clip import Clip, ClipKind, ClipQuality, FootEvent, JointMask
-from crowd.motion.importing.axes import PosedSource, convert, find_convention
+from crowd.motion.importing.axes import PosedSource, convert, find_convention, rest_positions
 from crowd.motion.importing.classify import jump_labels, kind_of, look_at, reach_labels
 from crowd.motion.importing.clips import facing_of_feet, plain_clip, stance_drift
 from crowd.motion.importing.contacts import Contacts, Stance, find_contacts, find_stances, sole_heights
@@ -26,7 +26,8 @@ from crowd.motion.importing.cycles import (
     sample,
     sample_linear,
 )
-from crowd.motion.importing.joint_names import JointMap, map_joints, read_mapping
+from crowd.motion.importing.joint_names import JointMap, read_mapping
+from crowd.motion.importing.joint_shape import recognise
 from crowd.motion.importing.labels import Correction
 from crowd.motion.importing.retarget import Retargeted, retarget
 from crowd.motion.rotation import conjugate, continuous, multiply, slerp, to_vector
@@ -121,7 +122,7 @@ def import_clip(
     settings, told = settings or ImportSettings(), correction or Correction()
     names = motion.skeleton.joint_names
     joints = (
-        map_joints(names, str(motion.path))
+        recognise(names, motion.skeleton.parent, rest_positions(motion), str(motion.path))
         if settings.mapping is None
         else read_mapping(settings.mapping, names)
     )

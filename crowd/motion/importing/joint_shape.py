@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import MotionError, describe
-from crowd.motion.importing.joint_names import JointMap, joint_map
+from crowd.motion.importing.joint_names import JointMap, joint_map, map_joints
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
@@ -15,6 +15,23 @@ UP = 1
 """Files whose joints have no names (glTF) have y up."""
 LEG = ("thigh", "shank", "foot", "toe")
 ARM = ("clavicle", "upper_arm", "forearm", "hand")
+
+
+def recognise(names: tuple[str, ...], parent: IntArray, rest: FloatArray, where: str) -> JointMap:
+    """Map joints by their names, or else by the shape of the skeleton; see `map_joints` and `map_by_shape`.
+
+    Raises
+    ------
+    MotionError
+        Neither tells; the message is about the names.
+    """
+    try:
+        return map_joints(names, where)
+    except MotionError as by_name:
+        try:
+            return map_by_shape(names, parent, rest, where)
+        except MotionError:
+            raise by_name from None
 
 
 def map_by_shape(names: tuple[str, ...], parent: IntArray, rest: FloatArray, where: str) -> JointMap:
@@ -47,6 +64,7 @@ def map_by_shape(names: tuple[str, ...], parent: IntArray, rest: FloatArray, whe
     if feet is None:
         raise _unlike_a_person(where, "two legs")
     pelvis = _meeting(feet, parent)
+    assert pelvis is not None
     legs = [_down_to(pelvis, foot, parent) for foot in feet]
     head_leaf = by_height[-1]
     trunk = _down_to(pelvis, head_leaf, parent)
@@ -87,10 +105,10 @@ def _above(joint: int, parent: IntArray) -> list[int]:
     return path
 
 
-def _meeting(pair: tuple[int, int], parent: IntArray) -> int:
-    """Lowest joint above two others."""
+def _meeting(pair: tuple[int, int], parent: IntArray) -> int | None:
+    """Lowest joint above two others; None when they hang on different roots."""
     above = set(_above(pair[0], parent))
-    return next(joint for joint in _above(pair[1], parent) if joint in above)
+    return next((joint for joint in _above(pair[1], parent) if joint in above), None)
 
 
 def _down_to(top: int, leaf: int, parent: IntArray) -> list[int]:
@@ -103,6 +121,8 @@ def _two_branches(by_height: list[int], parent: IntArray) -> tuple[int, int] | N
     """The lowest leaf, and the lowest one that meets it no sooner than three joints up."""
     for second in by_height[1:]:
         meeting = _meeting((by_height[0], second), parent)
+        if meeting is None:
+            continue
         if all(len(_down_to(meeting, leaf, parent)) >= 3 for leaf in (by_height[0], second)):
             return by_height[0], second
     return None
