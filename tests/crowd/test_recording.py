@@ -211,8 +211,7 @@ def run_writer(body: str, path: Path) -> subprocess.CompletedProcess[str]:
         """
         import os, resource, signal, sys
         from test_recording import SmallRun
-        from crowd.characters import Cast
-from crowd.errors import RecordingError
+        from crowd.errors import RecordingError
         from crowd.recording import Recorder
         run = SmallRun(count=40)
         recorder = Recorder(sys.argv[1], run, every=1)
