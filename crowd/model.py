@@ -18,9 +18,11 @@ from crowd.motion.skeleton import Skeleton
 from crowd.people import People
 from crowd.scenario import PlacedCharacters, Scenario, place
 from crowd.scenario.checks import check_clips
+from crowd.scenario.objects import place_objects
 from crowd.scenario.reach import check_reachable
 from crowd.scenario.worlds import TimedObstacles, build_world
 from crowd.world import World
+from crowd.world.objects import Objects
 
 IntArray = npt.NDArray[np.int32]
 
@@ -48,6 +50,8 @@ class Model:
         Walls and walkable grid; obstacles may come and go.
     timetable : TimedObstacles
         Obstacles that come and go by the scenario.
+    objects : Objects
+        Things that people can grasp: names, shapes and where they are at the start.
     """
 
     library: MotionLibrary
@@ -59,6 +63,7 @@ class Model:
     cast: Cast
     world: World
     timetable: TimedObstacles
+    objects: Objects
 
     @classmethod
     def build(
@@ -100,6 +105,7 @@ class Model:
             Cast.build(scenario, placed, seed, character_files),
             world,
             timetable,
+            place_objects(scenario),
         )
 
     @property

@@ -11,10 +11,11 @@ import math
 import os
 import shutil
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
+from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -29,6 +30,7 @@ from crowd.scenario.geometry import wall_segments
 
 if TYPE_CHECKING:
     from crowd.simulation import Frame, Simulation
+    from crowd.world.objects import Objects
 
 FORMAT = 1
 ROTATION_STEPS = 32767.0
@@ -70,6 +72,20 @@ STATE_FIELDS: Mapping[str, Field] = {
 }
 ROTATION = "rotation_local"
 PELVIS = "pelvis_root"
+OBJECT_FIELDS: Mapping[str, Field] = {
+    "position_world": Field(np.float64, (3,), "centre of the object, m"),
+    "rotation_world": Field(np.float32, (4,), "w x y z"),
+    "holder": Field(np.int32, (), "slot of the character that holds it, -1 for none"),
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A field with the number of its rows, and where its values come from."""
+
+    field: Field
+    rows: int
+    read: Callable[[Simulation], Any]
 
 
 class Recorder:
@@ -95,18 +111,15 @@ class Recorder:
         self.path = Path(path)
         self.every = every
         self.frame_count = 0
-        self._fields = _fields_of(simulation)
+        self._quantities = _quantities_of(simulation)
         self._pending = 0
         self._written_at = clock.monotonic()
-        frame_bytes = sum(
-            np.dtype(field.dtype).itemsize * math.prod(field.shape) for field in self._fields.values()
-        )
-        capacity = simulation.state.capacity
+        frame_bytes = sum(_row_bytes(one.field) * one.rows for one in self._quantities.values())
         per_second = max(1, round(BLOCK_SECONDS / (simulation.dt * every)))
-        self._block = max(1, min(per_second, BLOCK_BYTES // max(1, frame_bytes * capacity)))
+        self._block = max(1, min(per_second, BLOCK_BYTES // max(1, frame_bytes)))
         self._buffers = {
-            name: np.zeros((self._block, capacity, *field.shape), field.dtype)
-            for name, field in self._fields.items()
+            path: np.zeros((self._block, one.rows, *one.field.shape), one.field.dtype)
+            for path, one in self._quantities.items()
         }
         self._times = np.zeros(self._block)
         self._block_bytes = self._times.nbytes + sum(buffer.nbytes for buffer in self._buffers.values())
@@ -116,7 +129,7 @@ class Recorder:
         try:
             self._file = h5py.File(self.path, "w", libver="latest")
             self._write_facts(simulation)
-            self._create_frames(capacity)
+            self._create_frames()
             self._file.swmr_mode = True
             self._reserve()
         except (OSError, RuntimeError) as error:
@@ -135,16 +148,9 @@ class Recorder:
         """
         if (frame.index + 1) % self.every or self._file is None:
             return
-        simulation, row = frame.simulation, self._pending
-        state = simulation.state
-        for name, buffer in self._buffers.items():
-            if name == ROTATION:
-                buffer[row] = np.rint(simulation.joint_rotations_local() * ROTATION_STEPS)
-            elif name == PELVIS:
-                buffer[row] = simulation.pelvis_positions_root()
-            else:
-                buffer[row] = getattr(state, name)
-        self._times[row] = frame.time
+        for path, buffer in self._buffers.items():
+            buffer[self._pending] = self._quantities[path].read(frame.simulation)
+        self._times[self._pending] = frame.time
         self._pending += 1
         if self._pending == self._block or clock.monotonic() - self._written_at > LARGEST_DELAY:
             self._write()
@@ -265,40 +271,72 @@ class Recorder:
         world = file.create_group("world")
         for name, values in wall_segments(scenario.world).items():
             world.create_dataset(name, data=values)
+        if model.objects.count:
+            self._write_objects(model.objects)
 
-    def _create_frames(self, capacity: int) -> None:
+    def _write_objects(self, objects: Objects) -> None:
+        """Write the shapes of objects."""
         assert self._file is not None
-        frames = self._file.create_group("frames")
-        for name, field in self._fields.items():
-            row_bytes = np.dtype(field.dtype).itemsize * math.prod(field.shape)
-            rows = min(capacity, max(1, CHUNK_BYTES // (row_bytes * self._block)))
-            dataset = frames.create_dataset(
-                name,
-                shape=(0, capacity, *field.shape),
-                maxshape=(None, capacity, *field.shape),
+        group = self._file.create_group("objects")
+        group.create_dataset("name", data=list(objects.name), dtype=h5py.string_dtype("utf-8"))
+        for name in ("kind", "half_size", "colour", "mesh", "start_position_world", "start_rotation_world"):
+            group.create_dataset(name, data=getattr(objects, name))
+        for number, mesh in enumerate(objects.meshes):
+            group.create_dataset(f"meshes/{number}/vertex", data=mesh.vertex)
+            group.create_dataset(f"meshes/{number}/triangle", data=mesh.triangle)
+
+    def _create_frames(self) -> None:
+        assert self._file is not None
+        for path, one in self._quantities.items():
+            field = one.field
+            chunk_rows = min(one.rows, max(1, CHUNK_BYTES // (_row_bytes(field) * self._block)))
+            dataset = self._file.create_dataset(
+                path,
+                shape=(0, one.rows, *field.shape),
+                maxshape=(None, one.rows, *field.shape),
                 dtype=field.dtype,
-                chunks=(self._block, rows, *field.shape),
+                chunks=(self._block, chunk_rows, *field.shape),
                 compression="lzf",
                 shuffle=True,
             )
             dataset.attrs["meaning"] = field.meaning
-            self._datasets[name] = dataset
-        self._datasets["time"] = frames.create_dataset(
-            "time", shape=(0,), maxshape=(None,), dtype=np.float64, chunks=(1024,), fillvalue=np.nan
+            self._datasets[path] = dataset
+        self._datasets["time"] = self._file.create_dataset(
+            "frames/time", shape=(0,), maxshape=(None,), dtype=np.float64, chunks=(1024,), fillvalue=np.nan
         )
 
 
-def _fields_of(simulation: Simulation) -> dict[str, Field]:
-    """What is recorded of a simulation: plain discs have no pose."""
-    fields = dict(STATE_FIELDS)
+def _row_bytes(field: Field) -> int:
+    return int(np.dtype(field.dtype).itemsize * math.prod(field.shape))
+
+
+def _quantities_of(simulation: Simulation) -> dict[str, Quantity]:
+    """What is recorded of a simulation, by the path in the file: plain discs have no pose."""
+    capacity = simulation.state.capacity
+    found = {
+        f"frames/{name}": Quantity(field, capacity, attrgetter(f"state.{name}"))
+        for name, field in STATE_FIELDS.items()
+    }
     if simulation.bodies == "people":
         joint_count = simulation.model.skeleton.joint_count
         scale = f"1/{ROTATION_STEPS:.0f}"
-        fields[ROTATION] = Field(
-            np.int16, (joint_count, 4), f"joint against parent, w x y z in units of {scale}"
+        meaning = f"joint against parent, w x y z in units of {scale}"
+        found[f"frames/{ROTATION}"] = Quantity(
+            Field(np.int16, (joint_count, 4), meaning),
+            capacity,
+            lambda run: np.rint(run.joint_rotations_local() * ROTATION_STEPS),
         )
-        fields[PELVIS] = Field(np.float32, (3,), "pelvis in the root frame, m")
-    return fields
+        found[f"frames/{PELVIS}"] = Quantity(
+            Field(np.float32, (3,), "pelvis in the root frame, m"),
+            capacity,
+            lambda run: run.pelvis_positions_root(),
+        )
+    if simulation.model.objects.count:
+        for name, field in OBJECT_FIELDS.items():
+            found[f"objects/frames/{name}"] = Quantity(
+                field, simulation.model.objects.count, attrgetter(f"objects.{name}")
+            )
+    return found
 
 
 def _write_cast(file: h5py.File, cast: Cast) -> None:

@@ -20,9 +20,11 @@ from crowd.errors import RecordingError, describe
 from crowd.motion.rotation import about, multiply, rotate
 from crowd.motion.skeleton import Skeleton
 from crowd.motion.source import world_pose
-from crowd.recorder import FORMAT, PELVIS, ROTATION, STATE_FIELDS, Field, Recorder, reason
+from crowd.recorder import FORMAT, OBJECT_FIELDS, PELVIS, ROTATION, STATE_FIELDS, Field, Recorder, reason
+from crowd.world.mesh import Mesh
+from crowd.world.objects import Objects
 
-__all__ = ["STATE_FIELDS", "Field", "Poses", "Recorder", "Recording"]
+__all__ = ["OBJECT_FIELDS", "STATE_FIELDS", "Field", "Poses", "Recorder", "Recording"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[Any]
@@ -114,6 +116,8 @@ class Recording:
         """Wall segments. (wall, end, 3), m"""
         self.wall_appear_at: FloatArray = world["appear_at"][:]
         self.wall_disappear_at: FloatArray = world["disappear_at"][:]
+        self.objects = _objects_of(file["objects"]) if "objects" in file else Objects.none()
+        """Things that people can grasp; empty in recordings without."""
         time = file["frames"]["time"][:]
         is_whole = np.isfinite(time)
         self.frame_count = int(time.size if is_whole.all() else np.argmin(is_whole))
@@ -168,6 +172,35 @@ class Recording:
         if name not in self.fields:
             allowed = ", ".join(self.fields)
             raise RecordingError(describe(str(self.path), "holds no such quantity", name, allowed))
+        return self._read_frames("frames", name, frames)
+
+    def read_objects(self, name: str, frames: Rows = slice(None)) -> AnyArray:
+        """Read a quantity of the objects, named as in `ObjectState`.
+
+        Parameters
+        ----------
+        name : str
+            ``"position_world"``, ``"rotation_world"`` or ``"holder"``.
+        frames : int or slice
+            Which frames; all when left out.
+
+        Returns
+        -------
+        (object, ...) or (frame, object, ...) array
+
+        Raises
+        ------
+        RecordingError
+            There are no objects, or there is no such quantity or frame.
+        """
+        if self.objects.count == 0:
+            raise RecordingError(describe(str(self.path), "holds no objects"))
+        if name not in OBJECT_FIELDS:
+            allowed = ", ".join(OBJECT_FIELDS)
+            raise RecordingError(describe(str(self.path), "holds no such quantity", name, allowed))
+        return self._read_frames("objects/frames", name, frames)
+
+    def _read_frames(self, group: str, name: str, frames: Rows) -> AnyArray:
         if isinstance(frames, slice):
             frames = slice(*frames.indices(self.frame_count))
         elif not -self.frame_count <= frames < self.frame_count:
@@ -176,7 +209,7 @@ class Recording:
         else:
             frames %= self.frame_count
         try:
-            return np.asarray(self._file["frames"][name][frames])
+            return np.asarray(self._file[group][name][frames])
         except (OSError, RuntimeError) as error:
             raise RecordingError(describe(str(self.path), f"{name} is damaged", reason(error))) from error
 
@@ -244,3 +277,22 @@ def _unit(rotation: AnyArray) -> FloatArray:
     length = np.sqrt((values * values).sum(axis=-1, keepdims=True))
     values[..., 0] += length[..., 0] == 0.0
     return np.asarray(values / np.where(length == 0.0, 1.0, length))
+
+
+def _objects_of(group: h5py.Group) -> Objects:
+    """Shapes of recorded objects."""
+    stored = group.get("meshes", {})
+    meshes = [
+        Mesh(stored[str(number)]["vertex"][:], stored[str(number)]["triangle"][:])
+        for number in range(len(stored))
+    ]
+    return Objects(
+        tuple(group["name"].asstr()[:]),
+        group["kind"][:],
+        group["half_size"][:],
+        group["colour"][:],
+        group["mesh"][:],
+        tuple(meshes),
+        group["start_position_world"][:],
+        group["start_rotation_world"][:],
+    )

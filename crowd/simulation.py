@@ -29,6 +29,7 @@ from crowd.navigation.navigator import Navigator, avoidance_settings
 from crowd.population import Population
 from crowd.scenario import Scenario
 from crowd.state import Float32Array, FloatArray, IntArray, State
+from crowd.world.objects import ObjectState
 from crowd_kernels import _jit
 
 SERIAL_BELOW = 200
@@ -101,6 +102,7 @@ class Simulation:
         self.threads = thread_count(threads) if is_threaded else 1
         _jit.set_thread_count(self.threads)
         self.state = State.create(capacity)
+        self.objects = ObjectState(self.model.objects)
         self.model.timetable.update(self.model.world, 0.0)
         self.navigator = Navigator(self.model, avoidance_settings(scenario), turns_first=bodies == "people")
         self.population = Population(self.model, seed, self.navigator.routing)
@@ -245,6 +247,7 @@ class Simulation:
         return (
             ("population", self.population),
             ("foot_lock", self.foot_lock),
+            ("objects", self.objects),
             *self.navigator.parts(),
         )
 

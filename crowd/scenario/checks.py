@@ -7,6 +7,7 @@ import shapely
 
 from crowd.errors import nearest_first
 from crowd.scenario.geometry import Ground, is_within, obstacles, overlapping_pairs
+from crowd.scenario.objects import place_objects
 from crowd.scenario.schema import Goal, Scenario
 from crowd.scenario.source import Location, Problems
 
@@ -57,6 +58,7 @@ def check(scenario: Scenario) -> None:
     _check_individuals(scenario, problems)
     _check_names(scenario, problems)
     problems.raise_if_any()
+    place_objects(scenario)
 
 
 def check_clips(scenario: Scenario, known: Collection[str]) -> None:

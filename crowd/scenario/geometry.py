@@ -11,8 +11,9 @@ from shapely.geometry import LineString, box
 from shapely.geometry import Polygon as ShapelyPolygon
 from shapely.geometry.base import BaseGeometry
 
-from crowd.scenario.schema import Area, Point, TimedObstacle, WorldTable
+from crowd.scenario.schema import Area, TimedObstacle, WorldTable
 from crowd.scenario.source import Location
+from crowd.scenario.table import Point
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

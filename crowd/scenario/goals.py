@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from crowd.scenario.geometry import Ground
-from crowd.scenario.schema import Area, Goal, Point
+from crowd.scenario.schema import Area, Goal
 from crowd.scenario.source import Location, Problems
+from crowd.scenario.table import Point
 from crowd_kernels.random import uniform
 
 PURPOSE_GOAL = 105

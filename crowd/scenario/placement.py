@@ -20,13 +20,13 @@ from crowd.scenario.schema import (
     Character,
     Flow,
     GoalList,
-    Point,
     Region,
     Scenario,
     Spread,
 )
 from crowd.scenario.source import Location, Problems
 from crowd.scenario.starts import Starts, on_circle
+from crowd.scenario.table import Point
 from crowd_kernels.random import normal, uniform
 
 FloatArray = npt.NDArray[np.float64]

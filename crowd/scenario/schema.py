@@ -7,52 +7,21 @@ Ground points are ``[x, z]`` in metres, angles are degrees about the vertical: 0
 from dataclasses import fields
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    model_validator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
 from crowd.errors import SettingsError, nearest_first
 from crowd.navigation.avoidance import AvoidanceSettings
+from crowd.scenario.object_table import ObjectTable
 from crowd.scenario.source import ScenarioSource
+from crowd.scenario.table import Coordinate, NotNegative, Point, Positive, Table, refuse
 
 DEFAULT_DT = 1.0 / 60.0
 
-Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
-Point = tuple[Coordinate, Coordinate]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 BodyRadius = Annotated[float, Field(ge=0.1, le=2.0)]
 Speed = Annotated[float, Field(gt=0.0, le=8.0)]
 Stature = Annotated[float, Field(ge=1.0, le=2.3)]
 OnArrival = Literal["stay", "leave"]
-
-
-class Table(BaseModel):
-    """Base of all tables: read-only, no unknown keys, no NaN and no infinity."""
-
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True, validate_default=True
-    )
-
-
-def refuse(message: str, allowed: str | None = None, key: str | None = None, got: object = None) -> Exception:
-    """Make the error that a validator raises: what is wrong, what is allowed, and the key it concerns."""
-    context: dict[str, Any] = {"text": message}
-    if allowed is not None:
-        context["allowed"] = allowed
-    if key is not None:
-        context["key"] = key
-    if got is not None:
-        context["got"] = got
-    return PydanticCustomError("scenario", "{text}", context)
 
 
 class Area(Table):
@@ -416,7 +385,8 @@ class Scenario(Table):
     regions: tuple[Region, ...] = ()
     flows: tuple[Flow, ...] = ()
     plays: tuple[Play, ...] = ()
-    expect: dict[str, Bound] = {}
+    objects: tuple[ObjectTable, ...] = ()
+    expect: dict[str, Bound] = Field(default_factory=dict)
     """Metric key to bounds; a run with a metric outside them has failed."""
     avoidance: Avoidance = Avoidance()
 

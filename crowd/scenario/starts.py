@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from crowd.scenario.geometry import Ground
-from crowd.scenario.schema import Area, Point, Region
+from crowd.scenario.schema import Area, Region
+from crowd.scenario.table import Point
 from crowd_kernels.random import uniform
 
 PURPOSE_START_X = 111

@@ -19,6 +19,7 @@ from crowd.motion.skeleton import Segment, Skeleton
 from crowd.recording import STATE_FIELDS, Recorder, Recording
 from crowd.scenario import load_scenario
 from crowd.state import State
+from crowd.world.objects import Objects
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 COUNT = 5
@@ -52,7 +53,11 @@ class SmallRun:
         )
         placed = SimpleNamespace(name=tuple(f"person {row}" for row in range(count)))
         self.model = SimpleNamespace(
-            skeleton=small_skeleton(), people=people, placed=placed, cast=Cast.of_nobody(count)
+            skeleton=small_skeleton(),
+            people=people,
+            placed=placed,
+            cast=Cast.of_nobody(count),
+            objects=Objects.none(),
         )
 
     def frame(self, index: int) -> Any:
