@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from crowd.recording import Recorder, Recording
     from crowd.scenario import Scenario, load_scenario
     from crowd.simulation import Frame, Simulation
+    from crowd.trajectories import FollowingSimulation, load_trajectories, open_recording
 
 __all__ = [
     "CrowdError",
+    "FollowingSimulation",
     "Frame",
     "Metrics",
     "Recorder",
@@ -30,12 +32,15 @@ __all__ = [
     "Scenario",
     "Simulation",
     "load_scenario",
+    "load_trajectories",
     "measure",
+    "open_recording",
     "warm_up",
 ]
 
 _HOME = {
     "CrowdError": "errors",
+    "FollowingSimulation": "trajectories",
     "Frame": "simulation",
     "Metrics": "metrics",
     "Recorder": "recording",
@@ -43,7 +48,9 @@ _HOME = {
     "Scenario": "scenario",
     "Simulation": "simulation",
     "load_scenario": "scenario",
+    "load_trajectories": "trajectories",
     "measure": "metrics",
+    "open_recording": "trajectories",
     "warm_up": "compilation",
 }
 

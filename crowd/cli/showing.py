@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Protocol
 import typer
 
 if TYPE_CHECKING:
+    from crowd.recording import Recording
     from crowd.simulation import Frame, Simulation
 
 
@@ -73,20 +74,36 @@ def draw_picture(path: Path | None, simulation: Simulation) -> None:
 
 
 def view(
-    recording: Annotated[Path, typer.Argument(help="Recording made by `crowd run --record`.")],
+    shown: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="Recording made by `crowd run --record`, or trajectories: JuPedSim sqlite, text or HDF5, "
+            "or CSV of t, id, x, y.",
+        ),
+    ],
     video: Annotated[Path | None, typer.Option(help="Write a video instead of opening a window.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Write a picture instead of opening a window.")] = None,
     time: Annotated[float | None, typer.Option(help="Moment of the picture, s; the last one.")] = None,
+    start: Annotated[float | None, typer.Option(help="Time at which the video begins, s.")] = None,
+    stop: Annotated[float | None, typer.Option(help="Time at which the video ends, s.")] = None,
     camera: Annotated[str | None, typer.Option(help='{"eye": [x, y, z], "target": [x, y, z]}, m.')] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Keep the recording of the people who walk along trajectories.")
+    ] = None,
 ) -> int:
-    """Watch a recording."""
-    is_window = video is None and picture is None
+    """Watch a recording, or people who walk along trajectories of other programs."""
+    is_window = video is None and picture is None and record is None
     require_viewer(picture, video, view=is_window)
-    from crowd.recording import Recording
-    from crowd_viewer.camera import Camera
+    from crowd.cli.output import require_folder
 
-    chosen = None if camera is None else Camera.from_json(camera)
-    with Recording(recording) as opened:
+    require_folder("--record", record)
+    with _opened(shown, record) as opened:
+        if picture is None and video is None and not is_window:
+            return 0
+        from crowd_viewer.camera import Camera
+
+        chosen = None if camera is None else Camera.from_json(camera)
         if picture is not None:
             from crowd_viewer.picture import render, write_picture
 
@@ -94,9 +111,27 @@ def view(
         if video is not None:
             from crowd_viewer.video import film_recording
 
-            film_recording(opened, video, camera=chosen)
+            film_recording(opened, video, camera=chosen, start=start, stop=stop)
         if is_window:
             from crowd_viewer.window import show
 
             show(opened, camera=chosen)
     return 0
+
+
+def _opened(path: Path, record: Path | None) -> Recording:
+    """Open a recording; trajectories get bodies first, with a progress bar."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from crowd.trajectories import FollowingSimulation, open_recording
+
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(f"walking along {path.name}", total=1.0, visible=False)
+
+        def show(frame: Frame) -> None:
+            assert isinstance(frame.simulation, FollowingSimulation)
+            share = frame.time / max(frame.simulation.seconds, frame.time)
+            progress.update(task, completed=share, visible=True)
+
+        return open_recording(path, record=record, on_frame=show)

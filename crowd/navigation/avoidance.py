@@ -97,6 +97,21 @@ _RANGES: dict[str, tuple[float, float]] = {
 }
 
 
+def avoidance_limits(settings: AvoidanceSettings, dt: float) -> AvoidanceLimits:
+    """What the kernels read of the settings, for steps of `dt`, s."""
+    return AvoidanceLimits(
+        settings.neighbor_count,
+        settings.neighbor_distance,
+        settings.time_horizon,
+        settings.wall_time_horizon,
+        max(settings.contact_horizon, dt),
+        settings.perturbation,
+        settings.maximum_acceleration,
+        settings.follower_share,
+        settings.crowd_slowdown,
+    )
+
+
 @dataclass(frozen=True)
 class Neighbors:
     """Nearest others of each character, by distance, then by number.
@@ -163,20 +178,6 @@ class Avoidance:
             settings.contact_margin,
         )
 
-    def _limits(self, dt: float) -> AvoidanceLimits:
-        settings = self.settings
-        return AvoidanceLimits(
-            settings.neighbor_count,
-            settings.neighbor_distance,
-            settings.time_horizon,
-            settings.wall_time_horizon,
-            max(settings.contact_horizon, dt),
-            settings.perturbation,
-            settings.maximum_acceleration,
-            settings.follower_share,
-            settings.crowd_slowdown,
-        )
-
     def steer(
         self,
         position_world: FloatArray,
@@ -238,7 +239,7 @@ class Avoidance:
             cells.rows,
             cells.cell_size,
             walls.table,
-            self._limits(dt),
+            avoidance_limits(self.settings, dt),
             dt,
             seed,
             step,

@@ -8,10 +8,11 @@ import numpy as np
 from crowd.controllers.controller import Step
 from crowd.model import Model
 from crowd.navigation.avoidance import Avoidance, AvoidanceSettings
+from crowd.navigation.half_planes import half_planes
 from crowd.navigation.patience import Patience
 from crowd.navigation.routing import Routing, RoutingSettings
 from crowd.scenario import PlacedCharacters, Scenario
-from crowd.state import FloatArray
+from crowd.state import FloatArray, State
 from crowd_kernels.locomotion import prefer_crowd
 
 BRAKING_TIME = 0.8
@@ -105,6 +106,23 @@ class Navigator:
             state.desired_velocity_world,
             seed=step.seed,
             step=step.index,
+        )
+
+    def half_planes(self, state: State, character: int, dt: float, seed: int) -> tuple[FloatArray, int]:
+        """What restricts one character's next velocity, see `crowd.navigation.half_planes`."""
+        return half_planes(
+            self.avoidance.settings,
+            character,
+            state.position_world,
+            state.velocity_world,
+            state.preferred_velocity_world,
+            self.model.people.radius,
+            self._maximum_speed,
+            self._responsibility,
+            np.flatnonzero(state.is_active).astype(np.int32),
+            self.model.world.walls,
+            dt,
+            seed=seed,
         )
 
     def move_discs(self, step: Step) -> None:

@@ -23,7 +23,7 @@ from crowd_viewer.window import Window
 simulation = crowd.Simulation(crowd.load_scenario("plaza"), seed=3, characters=40, threads=1)
 for _ in range(30):
     simulation.step()
-with Window(simulation, size=(640, 360), quality=crowd_viewer.FINE) as window:
+with Window(simulation, size=(640, 360), quality=crowd_viewer.FINE, has_panels=False) as window:
     window.playback.is_paused = True
     window.refresh()
     plain = window.renderer.picture().astype(float)
@@ -34,11 +34,9 @@ with Window(simulation, size=(640, 360), quality=crowd_viewer.FINE) as window:
     rows, columns = np.nonzero(identity)
     middle = len(rows) // 2
     slot = int(identity[rows[middle], columns[middle]]) - 1
-    window._on_move(None, float(columns[middle]), float(rows[middle]))
-    window._on_button(None, 0, 1, 0)
-    window._on_button(None, 0, 0, 0)
+    window.pick(float(columns[middle]), float(rows[middle]))
     print("picked", window.picked == slot)
-    for key in ("f", "h", "1", "2", "3", "4", "5", "6", "t"):
+    for key in ("f", "h", *"1234567890", "b", "t"):
         window.key(key)
         window.refresh()
     print("drawn over", np.abs(window.renderer.picture() - plain).mean() > 1.0)

@@ -1,9 +1,8 @@
 """Pictures, videos and windows of simulations and recordings."""
 
-from crowd.recording import Recording
-from crowd.simulation import Simulation
 from crowd_viewer.camera import Camera
 from crowd_viewer.context import ViewerError
+from crowd_viewer.frame import Shown
 from crowd_viewer.picture import render, render_identities, write_picture
 from crowd_viewer.quality import FAST, FINE, Quality
 
@@ -12,6 +11,7 @@ __all__ = [
     "FINE",
     "Camera",
     "Quality",
+    "Shown",
     "ViewerError",
     "render",
     "render_identities",
@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 
-def show(shown: Simulation | Recording, *, camera: Camera | None = None) -> None:
+def show(shown: Shown, *, camera: Camera | None = None) -> None:
     """Open a window and stay there until it is closed, see `crowd_viewer.window.show`."""
     from crowd_viewer.window import show as open_window
 

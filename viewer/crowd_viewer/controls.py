@@ -156,6 +156,18 @@ class Playback:
         self.jump(self.time + self.speed * wall_seconds)
         return self.time - before
 
+    @property
+    def share(self) -> float:
+        """Part of what can be shown that has passed, 0 to 1."""
+        length = self.last - self.first
+        return (self.time - self.first) / length if length > 0.0 else 0.0
+
+    def toggle(self) -> None:
+        """Pause, or go on; at the end of a recording, begin again."""
+        self.is_paused = not self.is_paused
+        if not self.is_paused and self.time >= self.last:
+            self.time = self.first
+
     def jump(self, time: float) -> None:
         """Go to a time, as near as can be shown."""
         self.time = min(max(time, self.first), self.last)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,12 +22,16 @@ from crowd.recording import Recording
 from crowd.scenario import Scenario
 from crowd.simulation import Simulation
 from crowd.state import State
+from crowd.trajectories import Trajectories, open_recording
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_viewer.context import ViewerError
 from crowd_viewer.solids import Solid, scenario_solids, wall_solids
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
+Shown = Simulation | Recording | Trajectories | str | os.PathLike[str]
+"""What can be shown: paths are those of recordings and of files that `crowd.load_trajectories` reads."""
+Quantity = Callable[[str], npt.NDArray[Any] | None]
 LARGEST_IDENTITY = 1 << 24
 
 
@@ -71,6 +77,8 @@ class Scene:
     stature : (N,) float64
         m.
     segment_scale : (N, 8) float32
+    radius : (N,) float64
+        Body discs, m.
     bounds : tuple of float
         Lowest and highest x, lowest and highest z of the ground, m.
     solids : tuple of Solid
@@ -83,6 +91,7 @@ class Scene:
     skeleton: Skeleton
     stature: FloatArray
     segment_scale: Float32Array
+    radius: FloatArray
     bounds: tuple[float, float, float, float]
     solids: tuple[Solid, ...]
     cast: Cast
@@ -96,16 +105,25 @@ class Source(Protocol):
     def frame(self, time: float | None = None) -> CrowdFrame:
         """The crowd at a time, s; the present or last one when left out."""
 
+    def quantity(self, name: str) -> npt.NDArray[Any] | None:
+        """A quantity of `State` in the last frame, by name; None where it is not known."""
 
-def source_of(shown: Simulation | Recording) -> Source:
-    """Frames of a simulation or a recording.
+
+def opened(shown: Shown) -> Simulation | Recording:
+    """What is shown, opened where it is a file, and with bodies where it is trajectories."""
+    return shown if isinstance(shown, Simulation | Recording) else open_recording(shown)
+
+
+def source_of(shown: Shown) -> Source:
+    """Frames of whatever can be shown.
 
     Raises
     ------
     ViewerError
         The recording is empty.
     """
-    return LiveSource(shown) if isinstance(shown, Simulation) else ReplaySource(shown)
+    source = opened(shown)
+    return LiveSource(source) if isinstance(source, Simulation) else ReplaySource(source)
 
 
 def _identities(spawn_count: npt.NDArray[np.generic]) -> npt.NDArray[np.int64]:
@@ -127,6 +145,7 @@ class LiveSource:
             model.skeleton,
             model.people.stature,
             model.people.segment_scale,
+            model.people.radius,
             bounds,
             tuple(scenario_solids(scenario.world)),
             model.cast,
@@ -151,6 +170,10 @@ class LiveSource:
             joints.rotation_model,
         )
 
+    def quantity(self, name: str) -> npt.NDArray[Any] | None:
+        """A quantity of `State` now."""
+        return getattr(self.simulation.state, name, None)
+
 
 class ReplaySource:
     """Frames of a recording, between two recorded ones by interpolation."""
@@ -173,6 +196,7 @@ class ReplaySource:
             recording.skeleton,
             recording.stature,
             recording.segment_scale,
+            recording.radius,
             bounds,
             solids,
             recording.cast,
@@ -180,6 +204,7 @@ class ReplaySource:
         self._pose = State.create(recording.character_count)
         self._joints = standing_joints(self.scene)
         self._everyone = np.arange(recording.character_count, dtype=np.int32)
+        self._nearest = 0
 
     def frame(self, time: float | None = None) -> CrowdFrame:
         """The crowd at a time, s, at most that of the last frame."""
@@ -190,7 +215,7 @@ class ReplaySource:
         before = max(after - 1, 0)
         gap = float(times[after] - times[before])
         share = (time - float(times[before])) / gap if gap > 0.0 else 0.0
-        nearest = after if share >= 0.5 else before
+        nearest = self._nearest = after if share >= 0.5 else before
         both = {
             name: np.stack([recording.read(name, before), recording.read(name, after)])
             for name in ("position_world", "yaw", "spawn_count", "is_active")
@@ -211,6 +236,10 @@ class ReplaySource:
             self._joints.position_model,
             self._joints.rotation_model,
         )
+
+    def quantity(self, name: str) -> npt.NDArray[Any] | None:
+        """A quantity in the recorded frame that is nearest to the last one drawn."""
+        return self.recording.read(name, self._nearest) if name in self.recording.fields else None
 
     def _compute_joints(self, before: int, after: int, weight: FloatArray) -> None:
         """Compute joints of a moment between two frames."""

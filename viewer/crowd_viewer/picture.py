@@ -8,11 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import describe
-from crowd.recording import Recording
-from crowd.simulation import Simulation
 from crowd_viewer.camera import Camera
 from crowd_viewer.context import INSTALL, ViewerError, headless_context
-from crowd_viewer.frame import CrowdFrame, Scene, source_of
+from crowd_viewer.frame import CrowdFrame, Scene, Shown, source_of
 from crowd_viewer.quality import FINE, Quality
 from crowd_viewer.renderer import Renderer
 
@@ -22,7 +20,7 @@ OUTLIERS = 0.12
 
 
 def render(
-    shown: Simulation | Recording,
+    shown: Shown,
     *,
     time: float | None = None,
     camera: Camera | None = None,
@@ -33,7 +31,7 @@ def render(
 
     Parameters
     ----------
-    shown : Simulation or Recording
+    shown : Simulation, Recording, Trajectories or path
     time : float, optional
         Which moment of a recording, s; the last when left out. A simulation is drawn as it is now.
     camera : Camera, optional
@@ -61,7 +59,7 @@ def render(
 
 
 def render_identities(
-    shown: Simulation | Recording,
+    shown: Shown,
     *,
     time: float | None = None,
     camera: Camera | None = None,

@@ -14,6 +14,7 @@ from crowd_viewer.bodies import Body
 from crowd_viewer.camera import Camera, view_planes
 from crowd_viewer.characters import Characters
 from crowd_viewer.frame import CrowdFrame, Scene
+from crowd_viewer.ground_map import GroundMap
 from crowd_viewer.people import SHADOW_UNIT, People
 from crowd_viewer.programs import VIEW_BINDING
 from crowd_viewer.quality import FINE, Quality
@@ -62,6 +63,8 @@ class Renderer:
         self.people = People(context, scene, quality, bodies)
         self.characters = Characters(context, scene, quality)
         self.surroundings = Surroundings(context, scene, self.origin)
+        self.ground_map: GroundMap | None = None
+        """Drawn on the ground, below the people."""
         self._view = context.buffer(reserve=192, dynamic=True)
 
     def resize(self, size: tuple[int, int]) -> None:
@@ -104,6 +107,15 @@ class Renderer:
         self.people.draw("identity")
         self.characters.draw("identity")
         return targets.read_identity(), self._metres(targets.read_depth())
+
+    def use_pixels(self) -> None:
+        """Let what is drawn now have places in pixels, the upper left one first."""
+        width, height = self.targets.size
+        matrix = np.zeros((4, 4))
+        matrix[0, 0], matrix[0, 3] = 2.0 / width, -1.0
+        matrix[1, 1], matrix[1, 3] = -2.0 / height, 1.0
+        matrix[3, 3] = 1.0
+        self._write_view(matrix)
 
     def release(self) -> None:
         """Give the memory of the pictures back."""
@@ -195,6 +207,8 @@ class Renderer:
         self.surroundings.draw_sky(np.linalg.inv(self._to_clip).astype(np.float64))
         context.enable(context.BLEND)
         context.blend_func = context.SRC_ALPHA, context.ONE_MINUS_SRC_ALPHA
+        if self.ground_map is not None:
+            self.ground_map.draw()
         self.people.draw_blobs()
         context.disable(context.BLEND)
         self.targets.resolve()

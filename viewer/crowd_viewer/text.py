@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from crowd_viewer.programs import compile_program
 
@@ -12,8 +13,11 @@ if TYPE_CHECKING:
     import moderngl
 
 FIRST, LAST = 32, 126
-CELL = (10, 18)
+CELL = (18, 18)
+LINE_HEIGHT = 19
 FONT_SIZE = 15
+CAPACITY = 8192
+"""Letters of one picture, twice: with their shadows."""
 
 
 class Text:
@@ -21,32 +25,40 @@ class Text:
 
     def __init__(self, context: moderngl.Context) -> None:
         self.context = context
-        atlas = glyphs()
-        self.is_on = atlas is not None
-        if atlas is None:
+        self._rows: list[tuple[float, float, float, float]] = []
+        self._advance: list[float] = []
+        font = glyphs()
+        self.is_on = font is not None
+        if font is None:
             return
+        atlas, self._advance = font
         count = LAST - FIRST + 1
         self._atlas = context.texture((CELL[0] * count, CELL[1]), 1, atlas.tobytes(), alignment=1)
         self._program = compile_program(context, ("text.vert",), ("text.frag",))
         self._program["atlas"] = 0
-        self._buffer = context.buffer(reserve=4096 * 16, dynamic=True)
+        self._buffer = context.buffer(reserve=CAPACITY * 16, dynamic=True)
         self._array = context.vertex_array(
             self._program, [(self._buffer, "2f4 1f4 1f4/i", "place", "glyph", "shade")]
         )
 
-    def draw(self, lines: list[str], size: tuple[int, int], left: int = 12, top: int = 10) -> None:
-        """Draw lines with their first one's upper left corner at a pixel."""
+    def width(self, line: str) -> float:
+        """Length of a line, pixels."""
+        return sum(self._advance[number] for number in _numbers(line)) if self.is_on else 0.0
+
+    def write(self, lines: list[str], left: float, top: float) -> None:
+        """Add lines with their first one's upper left corner at a pixel."""
         if not self.is_on:
             return
-        rows = []
         for number, line in enumerate(lines):
-            for column, letter in enumerate(line):
-                code = ord(letter) if FIRST <= ord(letter) <= LAST else ord("?")
-                if letter != " ":
-                    x, y = left + column * CELL[0], top + number * (CELL[1] + 2)
-                    rows += [(x + 1, y + 1, code - FIRST, 0.0), (x, y, code - FIRST, 1.0)]
-        rows = rows[: self._buffer.size // 16]
-        if not rows:
+            x, y = float(round(left)), float(round(top) + number * LINE_HEIGHT)
+            for glyph in _numbers(line):
+                self._rows += [(round(x) + 1.0, y + 1.0, glyph, 0.0), (round(x), y, glyph, 1.0)]
+                x += self._advance[glyph]
+
+    def draw(self, size: tuple[int, int]) -> None:
+        """Draw all lines over a picture of a size, and forget them."""
+        rows, self._rows = self._rows[:CAPACITY], []
+        if not rows or not self.is_on:
             return
         self._buffer.write(np.array(rows, np.float32).tobytes())
         context = self.context
@@ -59,8 +71,13 @@ class Text:
         context.disable(context.BLEND)
 
 
-def glyphs() -> np.ndarray[tuple[int, int], np.dtype[np.uint8]] | None:
-    """Coverage of the printable characters side by side; None where there is no font."""
+def _numbers(line: str) -> list[int]:
+    """Places of letters in the table of glyphs."""
+    return [(ord(letter) if FIRST <= ord(letter) <= LAST else ord("?")) - FIRST for letter in line]
+
+
+def glyphs() -> tuple[npt.NDArray[np.uint8], list[float]] | None:
+    """Coverage of the printable characters side by side, and their widths, pixels; None without a font."""
     try:
         from PIL import Image, ImageDraw, ImageFont
 
@@ -69,8 +86,7 @@ def glyphs() -> np.ndarray[tuple[int, int], np.dtype[np.uint8]] | None:
         return None
     atlas = Image.new("L", (CELL[0] * (LAST - FIRST + 1), CELL[1]))
     draw = ImageDraw.Draw(atlas)
-    for code in range(FIRST, LAST + 1):
-        letter = chr(code)
-        width = draw.textlength(letter, font)
-        draw.text(((code - FIRST + 0.5) * CELL[0] - 0.5 * width, 0), letter, 255, font)
-    return np.asarray(atlas, np.uint8)
+    letters = [chr(code) for code in range(FIRST, LAST + 1)]
+    for number, letter in enumerate(letters):
+        draw.text((number * CELL[0] + 1, 0), letter, 255, font)
+    return np.asarray(atlas, np.uint8), [float(draw.textlength(letter, font)) for letter in letters]

@@ -165,11 +165,24 @@ def film_recording(
     size: tuple[int, int] = SIZE,
     quality: Quality = FINE,
     frames_per_second: float = FRAMES_PER_SECOND,
+    start: float | None = None,
+    stop: float | None = None,
 ) -> int:
-    """Make a video of a whole recording; returns the number of its pictures."""
+    """Make a video of a recording, or of its part from `start` to `stop`, s; returns the number of pictures.
+
+    Raises
+    ------
+    ViewerError
+        The recording is empty, or has nothing between these times.
+    """
     source = ReplaySource(recording)
     # A recording that was cut short simply ends earlier.
-    times = np.arange(float(recording.time[0]), float(recording.time[-1]) + 1e-6, 1.0 / frames_per_second)
+    first, last = float(recording.time[0]), float(recording.time[-1])
+    begin, end = max(first, first if start is None else start), min(last, last if stop is None else stop)
+    if end < begin:
+        got, allowed = f"{start} to {stop} s", f"{first:.2f} to {last:.2f} s"
+        raise ViewerError(describe(str(recording.path), "has no such time", got, allowed))
+    times = np.arange(begin, end + 1e-6, 1.0 / frames_per_second)
     chosen = camera or default_camera(source.scene, source.frame(float(times[0])), size)
     with (
         VideoWriter(path, size, frames_per_second) as writer,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time as clock
 from collections.abc import Generator
 from typing import TYPE_CHECKING, Any
@@ -11,16 +12,17 @@ import numpy as np
 from crowd.errors import describe
 from crowd.recording import Recording
 from crowd.simulation import Frame, Simulation
+from crowd_viewer.bindings import Bindings, help_lines, keys_of
 from crowd_viewer.camera import Camera
 from crowd_viewer.context import INSTALL, ViewerError, is_software, require_moderngl
 from crowd_viewer.controls import CameraControls, Playback
-from crowd_viewer.frame import LiveSource, ReplaySource
-from crowd_viewer.lines import Lines
-from crowd_viewer.overlays import Overlays
+from crowd_viewer.display import TIMELINE_TOP, Display, time_share
+from crowd_viewer.frame import Shown, opened, source_of
+from crowd_viewer.overlays import Overlays, Seen, nearest_people
+from crowd_viewer.panels import Panels, imgui_module
 from crowd_viewer.picture import default_camera
 from crowd_viewer.quality import FAST, FINE, Quality
 from crowd_viewer.renderer import Renderer
-from crowd_viewer.text import Text
 
 if TYPE_CHECKING:
     import moderngl
@@ -28,13 +30,7 @@ if TYPE_CHECKING:
 SIZE = (1280, 720)
 LONGEST_CATCH_UP = 0.1
 """Simulated time that one picture may wait for, s; a slow machine shows slow motion instead of jumps."""
-CLICK_DISTANCE = 4.0
-HELP = (
-    "left drag: orbit   right drag: look around   middle or shift drag: move   wheel: nearer",
-    "click: pick a person   F: follow   Home: see all   T: from above   W A S D Q E: fly",
-    "space: pause   . ,: single frames   [ ]: speed   drag below: time of a recording",
-    "1 velocity  2 way  3 disc  4 neighbours  5 feet  6 skeleton   H: this list   Esc: close",
-)
+SMOOTHED_PICTURES = 10
 
 
 def require_glfw() -> Any:
@@ -45,6 +41,7 @@ def require_glfw() -> Any:
     ViewerError
         It is not installed, or there is no screen.
     """
+    imgui_module()
     try:
         import glfw
     except ImportError as error:
@@ -62,12 +59,14 @@ class Window:
 
     Parameters
     ----------
-    shown : Simulation or Recording
+    shown : Simulation, Recording, Trajectories or path
     camera : Camera, optional
         One that sees the crowd when left out.
     size : tuple of int
     quality : Quality, optional
         By the driver when left out.
+    has_panels : bool
+        Show panels, where imgui-bundle is installed.
 
     Raises
     ------
@@ -77,34 +76,39 @@ class Window:
 
     def __init__(
         self,
-        shown: Simulation | Recording,
+        shown: Shown,
         *,
         camera: Camera | None = None,
         size: tuple[int, int] = SIZE,
         quality: Quality | None = None,
+        has_panels: bool = True,
     ) -> None:
         require_moderngl()
+        imgui = imgui_module() if has_panels else None
         self._glfw = require_glfw()
-        self.simulation = shown if isinstance(shown, Simulation) else None
-        self._source = LiveSource(shown) if isinstance(shown, Simulation) else ReplaySource(shown)
-        self.handle, self.context = self._open(size, self._source.scene.name)
+        source = opened(shown)
+        self.simulation = source if isinstance(source, Simulation) else None
+        self._source = source_of(source)
+        scene = self._source.scene
+        self.handle, self.context = self._open(size, scene.name)
         self.size = size
         chosen = quality or (FAST if is_software(self.context) else FINE)
-        self.renderer = Renderer(self.context, self._source.scene, size, chosen)
-        self.playback = self._playback(shown)
+        self.renderer = Renderer(self.context, scene, size, chosen)
+        self.playback = _playback(source)
         self._frame = self._source.frame(self.playback.time)
-        self._everything = default_camera(self._source.scene, self._frame, size)
+        self._everything = default_camera(scene, self._frame, size)
         self.controls = CameraControls(camera or self._everything)
-        self.overlays = Overlays(self.simulation)
+        self.overlays = Overlays()
         self.picked = -1
-        self.is_help_shown = False
-        self._text = Text(self.context)
-        self._lines = Lines(self.context, self.renderer.origin)
+        self._is_help_shown = False
+        self._display = Display(self.context, self.renderer, self.overlays)
+        if not self._display.text.is_on:
+            print(describe("viewer", "no text in the window: no font", allowed=INSTALL), file=sys.stderr)
+        self.keys = keys_of(self)
+        self._bindings = Bindings(self, self._glfw)
+        self._panels = Panels(imgui, self) if imgui is not None else None
         self._wall_time = clock.perf_counter()
-        self._mouse = (0.0, 0.0)
-        self._pressed_at: tuple[float, float] | None = None
         self._seconds_per_picture = 0.0
-        self._listen()
 
     # ---- what a program calls
 
@@ -119,8 +123,9 @@ class Window:
         self._glfw.poll_events()
         now = clock.perf_counter()
         wall, self._wall_time = now - self._wall_time, now
-        self._seconds_per_picture += 0.1 * (wall - self._seconds_per_picture)
-        self._fly(wall)
+        before = self._seconds_per_picture or wall
+        self._seconds_per_picture = before + (wall - before) / SMOOTHED_PICTURES
+        self.controls.fly(*self._bindings.flying(), min(wall, LONGEST_CATCH_UP))
         passed = self.playback.advance(min(wall, LONGEST_CATCH_UP))
         if self.simulation is None and self.playback.time >= self.playback.last:
             self.playback.is_paused = True
@@ -131,10 +136,16 @@ class Window:
             self._glfw.wait_events_timeout(0.05)
         return passed
 
+    def key(self, name: str) -> None:
+        """Do what a key does; names as in the list of keys."""
+        next(key for key in self.keys if key.name == name).action()
+
     def close(self) -> None:
         """Close the window."""
         if self.handle is not None:
             self._glfw.make_context_current(self.handle)
+            if self._panels is not None:
+                self._panels.close()
             self.renderer.release()
             self._glfw.destroy_window(self.handle)
             self.handle = None
@@ -148,66 +159,52 @@ class Window:
     # ---- drawing
 
     def _draw(self) -> None:
-        self._frame = self._source.frame(self.playback.time)
-        self.controls.follow(self._frame.position_world)
+        self._frame = frame = self._source.frame(self.playback.time)
+        self.controls.follow(frame.position_world)
+        camera = self.controls.camera
+        is_there = 0 <= self.picked < len(frame.is_active) and bool(frame.is_active[self.picked])
         self.renderer.people.picked = self.picked
-        self.renderer.draw(self._frame, self.controls.camera)
-        target = np.asarray(self.controls.camera.target)
-        self.overlays.draw(self._lines, self._frame, self._source.scene, target, self.picked)
-        self.renderer.targets.picture.use()
-        self._lines.draw(self.size)
-        self._text.draw(self._status(), self.size)
-        if self.simulation is None:
-            self._draw_timeline()
+        seen = Seen(
+            frame,
+            self._source.scene,
+            nearest_people(frame, np.asarray(camera.target)),
+            self.picked if is_there else -1,
+            self._source.quantity,
+            self.simulation,
+        )
+        self._display.prepare(seen)
+        self.renderer.draw(frame, camera)
+        self._display.draw(seen, self._status(seen), None if self.simulation is not None else self.playback)
         self.context.copy_framebuffer(self.context.screen, self.renderer.targets.picture)
+        if self._panels is not None:
+            self.context.screen.use()
+            self._panels.draw(self, seen)
         self._glfw.swap_buffers(self.handle)
 
-    def _status(self) -> list[str]:
+    def _status(self, seen: Seen) -> list[str]:
         """The line about what is seen, and the list of keys."""
-        frame, rate = self._frame, 1.0 / max(self._seconds_per_picture, 1e-3)
+        frame, rate = seen.frame, 1.0 / max(self._seconds_per_picture, 1e-3)
         people = int(frame.is_active.sum())
         line = f"{rate:5.1f} fps   {people} people   {frame.time:7.2f} s   {self.playback.speed:g} x"
         if self.playback.is_paused:
             line += "   paused"
         lines = [line]
-        if 0 <= self.picked < len(frame.is_active) and frame.is_active[self.picked]:
-            x, _, z = frame.position_world[self.picked]
-            lines.append(f"person {frame.identity[self.picked]} at {x:.2f}, {z:.2f} m")
-        return lines + (list(HELP) if self.is_help_shown else ["H: keys"])
+        if seen.picked >= 0:
+            x, _, z = frame.position_world[seen.picked]
+            lines.append(f"person {frame.identity[seen.picked]} at {x:.2f}, {z:.2f} m")
+        return lines + (help_lines(self.keys) if self._is_help_shown else ["h: keys"])
 
-    def _draw_timeline(self) -> None:
-        playback = self.playback
-        length = max(playback.last - playback.first, 1e-9)
-        columns = max((self.size[0] - 24) // 10, 2)
-        place = round((playback.time - playback.first) / length * (columns - 1))
-        bar = "-" * place + "O" + "-" * (columns - 1 - place)
-        self._text.draw([bar], self.size, top=self.size[1] - 28)
+    # ---- what mouse, keys and panels call
 
-    # ---- input
+    @property
+    def takes_mouse(self) -> bool:
+        """A panel has the mouse."""
+        return self._panels is not None and self._panels.takes_mouse
 
-    def key(self, name: str) -> None:
-        """Do what a key asks for; names as in `HELP`."""
-        playback, controls = self.playback, self.controls
-        number = "123456".find(name) if len(name) == 1 else -1
-        if number >= 0:
-            self.overlays.toggle(Overlays.NAMES[number])
-        elif name == "space":
-            playback.is_paused = not playback.is_paused
-        elif name in ".,":
-            playback.single_step(1 if name == "." else -1)
-        elif name in "[]":
-            playback.change_speed(1 if name == "]" else -1)
-        elif name == "f":
-            controls.toggle_follow(self.picked)
-        elif name == "t":
-            low_x, high_x, low_z, high_z = self._source.scene.bounds
-            controls.toggle_top(1.05 * max(high_z - low_z, (high_x - low_x) * self.size[1] / self.size[0]))
-        elif name == "home":
-            controls.frame_all(self._everything)
-        elif name == "h":
-            self.is_help_shown = not self.is_help_shown
-        elif name == "escape":
-            self._glfw.set_window_should_close(self.handle, True)
+    @property
+    def takes_keys(self) -> bool:
+        """A panel has the keys."""
+        return self._panels is not None and self._panels.takes_keys
 
     def pick(self, x: float, y: float) -> int:
         """Pick whoever is seen at a pixel; returns the slot, or -1."""
@@ -227,6 +224,18 @@ class Window:
         else:
             self.controls.pan(across, down, self.size[1])
 
+    def is_on_timeline(self, pixel: tuple[float, float]) -> bool:
+        """The pixel belongs to the bar that shows the time of a recording."""
+        return self.simulation is None and pixel[1] >= self.size[1] - TIMELINE_TOP - 6
+
+    def scrub(self, pixel: tuple[float, float], pressed_at: tuple[float, float]) -> bool:
+        """Go to the time at a pixel, when the mouse was pressed on the timeline."""
+        if not self.is_on_timeline(pressed_at):
+            return False
+        first, last = self.playback.first, self.playback.last
+        self.playback.jump(first + time_share(pixel[0], self.size[0]) * (last - first))
+        return True
+
     def resize(self, width: int, height: int) -> None:
         """Draw in another size; nothing is drawn while one side is 0."""
         self.size = (width, height)
@@ -234,76 +243,28 @@ class Window:
             self._glfw.make_context_current(self.handle)
             self.renderer.resize(self.size)
 
-    def _fly(self, wall_seconds: float) -> None:
-        glfw = self._glfw
+    def toggle_top(self) -> None:
+        """Look straight down, and back."""
+        low_x, high_x, low_z, high_z = self._source.scene.bounds
+        width, height = max(self.size[0], 1), max(self.size[1], 1)
+        self.controls.toggle_top(1.05 * max(high_z - low_z, (high_x - low_x) * height / width))
 
-        def held(key: int) -> float:
-            return float(glfw.get_key(self.handle, key) == glfw.PRESS)
+    def see_all(self) -> None:
+        """See the whole crowd."""
+        self.controls.frame_all(self._everything)
 
-        right = held(glfw.KEY_D) - held(glfw.KEY_A)
-        up = held(glfw.KEY_E) - held(glfw.KEY_Q)
-        ahead = held(glfw.KEY_W) - held(glfw.KEY_S)
-        self.controls.fly(right, up, ahead, min(wall_seconds, LONGEST_CATCH_UP))
+    def toggle_panels(self) -> None:
+        """Show or hide the panels."""
+        if self._panels is not None:
+            self._panels.is_shown = not self._panels.is_shown
 
-    def _listen(self) -> None:
-        glfw, handle = self._glfw, self.handle
-        names = {
-            glfw.KEY_SPACE: "space",
-            glfw.KEY_HOME: "home",
-            glfw.KEY_ESCAPE: "escape",
-            glfw.KEY_PERIOD: ".",
-            glfw.KEY_COMMA: ",",
-            glfw.KEY_LEFT_BRACKET: "[",
-            glfw.KEY_RIGHT_BRACKET: "]",
-        }
-        names |= {getattr(glfw, f"KEY_{letter.upper()}"): letter for letter in "fth123456"}
+    def toggle_help(self) -> None:
+        """Show or hide the list of keys."""
+        self._is_help_shown = not self._is_help_shown
 
-        def on_key(_: Any, key: int, code: int, action: int, mods: int) -> None:
-            if action != glfw.RELEASE and key in names:
-                self.key(names[key])
-
-        glfw.set_key_callback(handle, on_key)
-        glfw.set_mouse_button_callback(handle, self._on_button)
-        glfw.set_cursor_pos_callback(handle, self._on_move)
-        glfw.set_scroll_callback(handle, lambda _, x, y: self.controls.zoom(y))
-        glfw.set_framebuffer_size_callback(handle, lambda _, width, height: self.resize(width, height))
-
-    def _on_button(self, _: Any, button: int, action: int, mods: int) -> None:
-        glfw = self._glfw
-        if button != glfw.MOUSE_BUTTON_LEFT:
-            return
-        if action == glfw.PRESS:
-            self._pressed_at = self._mouse
-            self._scrub()
-        elif self._pressed_at is not None:
-            if np.hypot(*np.subtract(self._mouse, self._pressed_at)) < CLICK_DISTANCE:
-                self.pick(*self._mouse)
-            self._pressed_at = None
-
-    def _on_move(self, _: Any, x: float, y: float) -> None:
-        glfw, handle = self._glfw, self.handle
-        across, down = x - self._mouse[0], y - self._mouse[1]
-        self._mouse = (x, y)
-
-        def held(button: int) -> bool:
-            return bool(glfw.get_mouse_button(handle, button) == glfw.PRESS)
-
-        is_shifted = glfw.get_key(handle, glfw.KEY_LEFT_SHIFT) == glfw.PRESS
-        if held(glfw.MOUSE_BUTTON_LEFT) and not self._scrub():
-            self.drag("middle" if is_shifted else "left", across, down)
-        elif held(glfw.MOUSE_BUTTON_RIGHT):
-            self.drag("right", across, down)
-        elif held(glfw.MOUSE_BUTTON_MIDDLE):
-            self.drag("middle", across, down)
-
-    def _scrub(self) -> bool:
-        """Go to the time below the mouse, when it was pressed on the line of a recording's times."""
-        at = self._pressed_at
-        if self.simulation is not None or at is None or at[1] < self.size[1] - 30:
-            return False
-        share = (self._mouse[0] - 12.0) / max(self.size[0] - 24.0, 1.0)
-        self.playback.jump(self.playback.first + share * (self.playback.last - self.playback.first))
-        return True
+    def ask_to_close(self) -> None:
+        """Close after this picture."""
+        self._glfw.set_window_should_close(self.handle, True)
 
     # ---- opening
 
@@ -323,11 +284,12 @@ class Window:
         loader: Any = Loader(glfw)
         return handle, moderngl.create_context(require=330, context=loader)
 
-    def _playback(self, shown: Simulation | Recording) -> Playback:
-        if isinstance(shown, Simulation):
-            return Playback(time=shown.time, step=shown.dt)
-        first, last = float(shown.time[0]), float(shown.time[-1])
-        return Playback(time=first, first=first, last=last, step=shown.frame_seconds)
+
+def _playback(shown: Simulation | Recording) -> Playback:
+    if isinstance(shown, Simulation):
+        return Playback(time=shown.time, step=shown.dt)
+    first, last = float(shown.time[0]), float(shown.time[-1])
+    return Playback(time=first, first=first, last=last, step=shown.frame_seconds)
 
 
 class Loader:
@@ -364,12 +326,12 @@ def shown_frames(
                 yield simulation.step()
 
 
-def show(shown: Simulation | Recording, *, camera: Camera | None = None) -> None:
+def show(shown: Shown, *, camera: Camera | None = None) -> None:
     """Open a window and stay there until it is closed.
 
     Parameters
     ----------
-    shown : Simulation or Recording
+    shown : Simulation, Recording, Trajectories or path
         A simulation runs on while it is shown.
     camera : Camera, optional
 
@@ -378,10 +340,11 @@ def show(shown: Simulation | Recording, *, camera: Camera | None = None) -> None
     ViewerError
         There is no screen, or no OpenGL 3.3; the message says what to install.
     """
-    if isinstance(shown, Simulation):
-        for _ in shown_frames(shown, 1 << 62, camera=camera):
+    source = opened(shown)
+    if isinstance(source, Simulation):
+        for _ in shown_frames(source, 1 << 62, camera=camera):
             pass
         return
-    with Window(shown, camera=camera) as window:
+    with Window(source, camera=camera) as window:
         while window.is_open:
             window.refresh()
