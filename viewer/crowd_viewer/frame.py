@@ -31,6 +31,7 @@ FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 Shown = Simulation | Recording | Trajectories | str | os.PathLike[str]
 """What can be shown: paths are those of recordings and of files that `crowd.load_trajectories` reads."""
+SAMPLED_FRAMES = 50
 Quantity = Callable[[str], npt.NDArray[Any] | None]
 LARGEST_IDENTITY = 1 << 24
 
@@ -64,6 +65,11 @@ class CrowdFrame:
     yaw: FloatArray
     joint_position_model: Float32Array
     joint_rotation_model: Float32Array
+
+    @property
+    def places(self) -> FloatArray:
+        """Where people are, m. (P, 3)."""
+        return self.position_world[self.is_active]
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,9 @@ class Source(Protocol):
 
     def frame(self, time: float | None = None) -> CrowdFrame:
         """The crowd at a time, s; the present or last one when left out."""
+
+    def places(self) -> FloatArray:
+        """Where people are, now or during the whole recording, m. (P, 3)."""
 
     def quantity(self, name: str) -> npt.NDArray[Any] | None:
         """A quantity of `State` in the last frame, by name; None where it is not known."""
@@ -169,6 +178,10 @@ class LiveSource:
             joints.position_model,
             joints.rotation_model,
         )
+
+    def places(self) -> FloatArray:
+        """Where people are now, m. (P, 3)."""
+        return self.frame().places
 
     def quantity(self, name: str) -> npt.NDArray[Any] | None:
         """A quantity of `State` now."""
@@ -237,6 +250,10 @@ class ReplaySource:
             self._joints.rotation_model,
         )
 
+    def places(self, start: float = -math.inf, stop: float = math.inf) -> FloatArray:
+        """Where people are in some frames from `start` to `stop`, s. (P, 3) m."""
+        return recorded_places(self.recording, start, stop)
+
     def quantity(self, name: str) -> npt.NDArray[Any] | None:
         """A quantity in the recorded frame that is nearest to the last one drawn."""
         return self.recording.read(name, self._nearest) if name in self.recording.fields else None
@@ -283,12 +300,20 @@ def recorded_scenario(recording: Recording) -> Scenario | None:
         return None
 
 
+def recorded_places(recording: Recording, start: float = -math.inf, stop: float = math.inf) -> FloatArray:
+    """Where people are in up to `SAMPLED_FRAMES` frames of a recording between two times, s. (P, 3) m."""
+    first, last = np.searchsorted(recording.time, [start, stop])
+    places = [np.zeros((0, 3))]
+    for frame in np.unique(np.linspace(first, max(last - 1, first), SAMPLED_FRAMES).astype(int)).tolist():
+        if frame < recording.frame_count:
+            places.append(recording.read("position_world", frame)[recording.read("is_active", frame)])
+    return np.concatenate(places)
+
+
 def _bounds_of(recording: Recording) -> tuple[float, float, float, float]:
     """Ground under all walls and all ways."""
-    points = [recording.walls.reshape(-1, 3)]
-    if recording.frame_count:
-        step = max(1, recording.frame_count // 50)
-        points.append(recording.read("position_world", slice(0, None, step)).reshape(-1, 3))
-    everything = np.concatenate(points) if points else np.zeros((1, 3))
-    low, high = everything.min(axis=0) - 2.0, everything.max(axis=0) + 2.0
+    points = np.concatenate([recording.walls.reshape(-1, 3), recorded_places(recording)])
+    if not len(points):
+        points = np.zeros((1, 3))
+    low, high = points.min(axis=0) - 2.0, points.max(axis=0) + 2.0
     return float(low[0]), float(high[0]), float(low[2]), float(high[2])

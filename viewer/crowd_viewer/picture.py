@@ -10,10 +10,11 @@ import numpy.typing as npt
 from crowd.errors import describe
 from crowd_viewer.camera import Camera
 from crowd_viewer.context import INSTALL, ViewerError, headless_context
-from crowd_viewer.frame import CrowdFrame, Scene, Shown, source_of
+from crowd_viewer.frame import Scene, Shown, source_of
 from crowd_viewer.quality import FINE, Quality
 from crowd_viewer.renderer import Renderer
 
+FloatArray = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]
 OUTLIERS = 0.12
 """Share of people at each side who may be outside of a picture that nobody has chosen a camera for."""
@@ -52,7 +53,7 @@ def render(
     """
     source = source_of(shown)
     frame = source.frame(time)
-    chosen = camera or default_camera(source.scene, frame, size)
+    chosen = camera or default_camera(source.scene, frame.places, size)
     with Renderer(headless_context(), source.scene, size, quality) as renderer:
         renderer.draw(frame, chosen, keeps_levels=False)
         return renderer.picture()
@@ -71,20 +72,19 @@ def render_identities(
     """
     source = source_of(shown)
     frame = source.frame(time)
-    chosen = camera or default_camera(source.scene, frame, size)
+    chosen = camera or default_camera(source.scene, frame.places, size)
     with Renderer(headless_context(), source.scene, size) as renderer:
         return renderer.identities(frame, chosen)
 
 
-def default_camera(scene: Scene, frame: CrowdFrame, size: tuple[int, int]) -> Camera:
-    """See most of the people from ahead and above, or the ground where there is nobody."""
+def default_camera(scene: Scene, places: FloatArray, size: tuple[int, int]) -> Camera:
+    """See most of the places where people are, (P, 3) m, from ahead and above; the ground without any."""
     low_x, high_x, low_z, high_z = scene.bounds
     low, high = np.array([low_x, 0.0, low_z]), np.array([high_x, 0.0, high_z])
-    there = frame.position_world[frame.is_active]
-    if len(there):
-        share = 100.0 * OUTLIERS if len(there) > 20 else 0.0
-        low = np.percentile(there, share, axis=0) - 1.0
-        high = np.percentile(there, 100.0 - share, axis=0) + 1.0
+    if len(places):
+        share = 100.0 * OUTLIERS if len(places) > 20 else 0.0
+        low = np.percentile(places, share, axis=0) - 1.0
+        high = np.percentile(places, 100.0 - share, axis=0) + 1.0
     corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
     return Camera.framing(corners, size[0] / size[1])
 

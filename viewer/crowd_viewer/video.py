@@ -134,7 +134,7 @@ class Film:
         frames_per_second: float = FRAMES_PER_SECOND,
     ) -> None:
         self._source = LiveSource(simulation)
-        self._camera = camera or default_camera(self._source.scene, self._source.frame(), size)
+        self._camera = camera or default_camera(self._source.scene, self._source.places(), size)
         self._renderer = Renderer(headless_context(), self._source.scene, size, quality)
         self._writer = VideoWriter(path, size, frames_per_second)
         self._interval = 1.0 / frames_per_second
@@ -183,7 +183,7 @@ def film_recording(
         got, allowed = f"{start} to {stop} s", f"{first:.2f} to {last:.2f} s"
         raise ViewerError(describe(str(recording.path), "has no such time", got, allowed))
     times = np.arange(begin, end + 1e-6, 1.0 / frames_per_second)
-    chosen = camera or default_camera(source.scene, source.frame(float(times[0])), size)
+    chosen = camera or default_camera(source.scene, source.places(begin, end), size)
     with (
         VideoWriter(path, size, frames_per_second) as writer,
         Renderer(headless_context(), source.scene, size, quality) as renderer,

@@ -96,7 +96,7 @@ class Window:
         self.renderer = Renderer(self.context, scene, size, chosen)
         self.playback = _playback(source)
         self._frame = self._source.frame(self.playback.time)
-        self._everything = default_camera(scene, self._frame, size)
+        self._everything = default_camera(scene, self._source.places(), size)
         self.controls = CameraControls(camera or self._everything)
         self.overlays = Overlays()
         self.picked = -1
