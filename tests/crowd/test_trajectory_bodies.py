@@ -9,7 +9,7 @@ import crowd
 from crowd.trajectories import Trajectories, Way, open_recording
 from crowd.trajectories.following import motion_along
 
-ZARA = Path(__file__).resolve().parents[3] / "../shared/data/ucy_zara01"
+ZARA = Path(__file__).resolve().parents[2] / "../shared/data/ucy_zara01"
 DT = 1.0 / 60.0
 
 
