@@ -88,8 +88,7 @@ def import_(
     save_library(out, report.examples.library)
     print(f"wrote {out}")
     if write_labels is not None:
-        scale = {entry.clip.name: entry.scale for entry in report.imported}
-        label_files.write_labels(write_labels, (entry.clip for entry in report.imported), scale)
+        label_files.write_labels(write_labels, report.imported)
         print(f"wrote {write_labels}")
     if picture is not None:
         _draw(report.examples.library, picture)

@@ -4,6 +4,7 @@ The figures are those measured on the same files for the collection that the fil
 """
 
 import math
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from crowd.motion.clip import ClipKind
 from crowd.motion.formats import find_motion_files, read_motions
 from crowd.motion.importing.folder import Request, import_motions
 from crowd.motion.importing.importer import import_clip
+from crowd.motion.importing.labels import write_labels
 from crowd.motion.library_file import load_library, save_library
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -174,6 +176,56 @@ def test_reaches_are_recognised_with_their_apex(imported):
     assert floor.hand_position[1] < 0.3
     high = imported["ChrHarmony_Relax001_ArmReachMiddleHigh"].clip.reach
     assert high.hand_position[1] > 1.8
+
+
+@pytest.mark.parametrize(
+    ("name", "apex", "up"),
+    [
+        ("HDM_bk_depositFloorR_007_120", 1.6, 0.05),
+        ("HDM_bk_depositFloorR_011_120", 1.15, 0.07),
+        ("HDM_bk_grabHighR_005_120", 1.05, 1.51),
+        ("HDM_bk_grabHighR_008_120", 0.7, 1.49),
+    ],
+)
+def test_reaches_without_tags_have_their_apex_where_the_hand_rests(name, apex, up):
+    (motion,) = read_motions(DATA / "hdm05" / f"{name}.bvh")
+    reach = import_clip(motion, build_skeleton()).clip.reach
+    assert reach.apex == pytest.approx(apex, abs=0.15)
+    assert reach.hand_position[1] == pytest.approx(up, abs=0.06)
+
+
+def test_found_apexes_agree_with_the_tags():
+    errors = []
+    for file in find_motion_files([SMARTBODY / "MocapReaching" / "motions"]):
+        (motion,) = read_motions(file)
+        tagged = dict(motion.tags).get("emphasis", 0.0)
+        if "Reach" not in file.name or "Jump" in file.name or tagged < 0.2:
+            continue
+        untold = import_clip(replace(motion, tags=()), build_skeleton())
+        errors.append(abs(untold.clip.reach.apex - tagged))
+    assert len(errors) > 25
+    assert np.mean(errors) < 0.1
+    assert np.max(errors) < 0.35
+
+
+@pytest.mark.parametrize("name", ["MaleLocomotion", "jumping", "MocapReaching"])
+def test_written_labels_change_nothing(reports, tmp_path, name):
+    path = tmp_path / "labels.toml"
+    write_labels(path, reports[name].imported)
+    again = import_motions(Request([SMARTBODY / name], name, labels=path))
+    for first, second in zip(reports[name].imported, again.imported, strict=True):
+        one, other = first.clip, second.clip
+        assert (one.name, one.kind) == (other.name, other.kind)
+        assert one.parameters == pytest.approx(other.parameters, abs=1e-4)
+        for label in ("jump", "reach"):
+            pair = getattr(one, label), getattr(other, label)
+            assert (pair[0] is None) == (pair[1] is None)
+            if pair[0] is not None:
+                for value, told in zip(astuple(pair[0]), astuple(pair[1]), strict=True):
+                    assert value == told if isinstance(value, str) else value == pytest.approx(told, abs=1e-3)
+        assert [event for _, event in one.foot_events] == [event for _, event in other.foot_events]
+        for (time, _), (told, _) in zip(one.foot_events, other.foot_events, strict=True):
+            assert time == pytest.approx(told, abs=1e-3)
 
 
 def test_transitions_are_not_taken_for_gaits(imported):

@@ -15,7 +15,13 @@ from crowd.motion.importing.clips import mirrored, stance_drift
 from crowd.motion.importing.example_set import NEEDS, assemble, distance
 from crowd.motion.importing.importer import ImportSettings, import_clip
 from crowd.motion.importing.joint_names import FAMILIES, REQUIRED, map_joints, normalised, read_mapping
-from crowd.motion.importing.labels import Correction, read_labels, write_labels
+from crowd.motion.importing.labels import (
+    Correction,
+    JumpCorrection,
+    ReachCorrection,
+    read_labels,
+    write_labels,
+)
 from crowd.motion.library_file import load_library, save_library
 from crowd.motion.procedural import built_in_library
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, slerp, swing, to_vector
@@ -263,11 +269,47 @@ def test_labels_correct_what_was_found(tmp_path):
     assert gesture.kind is ClipKind.GESTURE
     with pytest.raises(MotionError, match="begin and end"):
         import_clip(source, SKELETON, correction=Correction(begin=5.0))
+    with pytest.raises(MotionError, match="no time is found with both feet in the air"):
+        import_clip(source, SKELETON, correction=Correction(kind=ClipKind.JUMP))
+    with pytest.raises(MotionError, match="there is no reach in it"):
+        import_clip(source, SKELETON, correction=Correction(reach=ReachCorrection(side="left")))
+
+
+def test_told_jumps_and_reaches_are_measured_at_the_told_times():
+    source = as_source(LIBRARY.clip("walk"))
+    jump = JumpCorrection(take_off=0.3, apex=0.4, landing=0.6)
+    clip = import_clip(source, SKELETON, correction=Correction(kind=ClipKind.JUMP, jump=jump)).clip
+    assert (clip.jump.take_off, clip.jump.apex, clip.jump.landing) == (0.3, 0.4, 0.6)
+    speed = LIBRARY.clip("walk").parameters[0]
+    assert clip.jump.flight_length == pytest.approx(0.3 * speed, rel=0.1)
+    found = {
+        side: import_clip(
+            source,
+            SKELETON,
+            correction=Correction(kind=ClipKind.REACH, reach=ReachCorrection(side=side, apex=0.5)),
+        ).clip.reach
+        for side in ("left", "right")
+    }
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        assert (found[side].side, found[side].apex) == (side, 0.5)
+        assert sign * found[side].hand_position[0] > 0.1
+
+
+def test_written_labels_are_read_back_and_change_nothing(tmp_path):
     path = tmp_path / "crowd-labels.toml"
-    write_labels(path, [clip, LIBRARY.clip("jog")], {"walk": 1.0})
-    again = read_labels(path)
-    assert again["walk"].forward == pytest.approx(1.0)
-    assert again["walk"].turn == pytest.approx(10.0)
+    sources = [as_source(LIBRARY.clip(name)) for name in ("walk", "walk_circle_left", "jog", "idle")]
+    found = [import_clip(source, SKELETON) for source in sources]
+    write_labels(path, found)
+    told = read_labels(path)
+    assert list(told) == [entry.clip.name for entry in found]
+    for source, entry in zip(sources, found, strict=True):
+        again = import_clip(source, SKELETON, correction=told[entry.clip.name]).clip
+        assert again.kind is entry.clip.kind
+        assert again.parameters == pytest.approx(entry.clip.parameters, abs=1e-5)
+        assert [event for _, event in again.foot_events] == [event for _, event in entry.clip.foot_events]
+        times = np.array([[time for time, _ in clip.foot_events] for clip in (again, entry.clip)])
+        assert np.abs(times[0] - times[1]).max(initial=0.0) < 2e-4
+        assert np.abs(again.rotation_local - entry.clip.rotation_local).max() < 2e-3
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from crowd.motion.clip import ClipKind, JumpLabels, ReachLabels
 from crowd.motion.importing.contacts import BALL, Contacts
 from crowd.motion.importing.cycles import Window, heading_of, posed
+from crowd.motion.importing.labels import JumpCorrection, ReachCorrection
 from crowd.motion.importing.retarget import Retargeted, runs
 from crowd.motion.rotation import about, rotate
 from crowd.motion.skeleton import Skeleton
@@ -35,6 +37,8 @@ HAND_EXCURSION = 0.22
 ON_THE_SPOT, TURNED, STEPPED, ONE_STEP = 0.35, math.radians(30.0), 0.06, 0.6
 EARLIEST_APEX = 0.2
 """Tags before this are placeholders, s."""
+NEAR_APEX = 0.8
+"""The apex of a reach without tags is where the hand is slowest beyond this share of its farthest way."""
 REACH_WORDS = ("reach", "grab", "deposit", "grasp", "pick", "touch")
 
 
@@ -183,18 +187,33 @@ def kind_of(name: str, motions: Motions, window: Window | None) -> ClipKind:
 
 
 def jump_labels(
-    motion: Retargeted, motions: Motions, tags: dict[str, float], yaw: float
+    motion: Retargeted, motions: Motions, tags: Mapping[str, float], yaw: float, told: JumpCorrection
 ) -> JumpLabels | None:
-    """Labels of a jump, `yaw` being the facing at its start, rad; None without flight."""
-    if motions.flight is None:
+    """Labels of a jump; None without flight.
+
+    Parameters
+    ----------
+    motion : Retargeted
+    motions : Motions
+    tags : mapping
+        Named times of the source, s.
+    yaw : float
+        Facing at the start, rad.
+    told : JumpCorrection
+        What the user says instead.
+    """
+    if motions.flight is None and (told.take_off is None or told.landing is None):
         return None
-    take_off, landing = motions.flight
+    found = motions.flight or (0.0, motions.duration)
+    take_off = found[0] if told.take_off is None else min(told.take_off, motions.duration)
+    landing = found[1] if told.landing is None else min(told.landing, motions.duration)
     rate, travel = motion.frame_rate, motion.travel
     first, last = round(take_off * rate), min(round(landing * rate), len(travel) - 1)
-    apex = (first + int(travel[first : last + 1, 1].argmax())) / rate
+    apex = (first + int(travel[first : max(last, first) + 1, 1].argmax())) / rate
     tagged = tags.get("emphasis", 0.0)
     if take_off < tagged < landing:
         apex = tagged
+    apex = apex if told.apex is None else told.apex
     way, flight = travel[-1] - travel[0], travel[last] - travel[first]
     length = math.hypot(way[0], way[2])
     direction = math.remainder(math.atan2(way[0], way[2]) - yaw, 2.0 * math.pi) if length > 0.1 else 0.0
@@ -204,35 +223,45 @@ def jump_labels(
 
 
 def reach_labels(
-    motion: Retargeted, motions: Motions, skeleton: Skeleton, tags: dict[str, float], yaw: float
+    motion: Retargeted,
+    motions: Motions,
+    skeleton: Skeleton,
+    tags: Mapping[str, float],
+    yaw: float,
+    told: ReachCorrection,
 ) -> ReachLabels:
-    """Labels of a reach: the hand that goes farther, and where it is at the tagged or the farthest moment.
+    """Labels of a reach: the hand that goes farther, and where it is at the told, tagged or found moment.
 
     Parameters
     ----------
     motion : Retargeted
     motions : Motions
     skeleton : Skeleton
-    tags : dict
+    tags : mapping
         Named times of the source, s.
     yaw : float
         Facing at the start, rad.
+    told : ReachCorrection
+        What the user says instead.
     """
     _, position = posed(motion.rotation_local, motion.pelvis, skeleton)
-    ways = {
-        side: np.linalg.norm(position[:, joint] - position[0, joint], axis=1).max()
-        for side in ("right", "left")
-        for joint in [skeleton.joint(f"{side}_hand")]
-    }
-    side = max(ways, key=lambda name: float(ways[name]))
-    hand = position[:, skeleton.joint(f"{side}_hand")]
-    chest = position[:, skeleton.joint("spine_4")]
-    apex = tags.get("emphasis", 0.0)
-    is_in_air = motions.flight is not None and motions.flight[1] - motions.flight[0] >= SHORTEST_FLIGHT
-    if not EARLIEST_APEX < apex <= motions.duration:
-        away = hand[:, 1] if is_in_air else np.linalg.norm((hand - chest) - (hand[0] - chest[0]), axis=1)
-        apex = float(away.argmax()) / motion.frame_rate
+    hands = {side: position[:, skeleton.joint(f"{side}_hand")] for side in ("right", "left")}
+    ways = {name: float(np.linalg.norm(hand - hand[0], axis=1).max()) for name, hand in hands.items()}
+    side = max(ways, key=lambda name: ways[name]) if told.side is None else str(told.side)
+    hand = hands[side]
+    apex = tags.get("emphasis", 0.0) if told.apex is None else told.apex
+    if told.apex is None and not EARLIEST_APEX < apex <= motions.duration:
+        is_in_air = motions.flight is not None and motions.flight_gravity > 0.5 * GRAVITY
+        apex = (int(hand[:, 1].argmax()) if is_in_air else apex_of(hand)) / motion.frame_rate
     frame = min(round(apex * motion.frame_rate), len(hand) - 1)
     start = motion.pelvis[0] * (1.0, 0.0, 1.0)
     place = rotate(about(1, -yaw), hand[frame] - start)
     return ReachLabels(side, apex, (float(place[0]), float(place[1]), float(place[2])))
+
+
+def apex_of(hand: FloatArray) -> int:
+    """Frame in which a hand (F, 3) is slowest while it is far from its way from the start to the end."""
+    share = np.linspace(0.0, 1.0, len(hand))[:, None]
+    away = np.linalg.norm(hand - hand[0] - share * (hand[-1] - hand[0]), axis=1)
+    speed = np.linalg.norm(np.gradient(hand, axis=0), axis=1)
+    return int(np.where(away >= NEAR_APEX * away.max(), speed, np.inf).argmin())

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from crowd.motion.body import sole_points
 from crowd.motion.clip import Clip, ClipKind, FootEvent, JointMask
-from crowd.motion.importing.contacts import Stance
 from crowd.motion.importing.cycles import close_seam, heading_of, posed, sample, sample_linear
 from crowd.motion.importing.retarget import Retargeted, smoothed
 from crowd.motion.rotation import about, continuous, multiply, rotate
@@ -27,10 +26,9 @@ def plain_clip(
     kind: ClipKind,
     motion: Retargeted,
     skeleton: Skeleton,
-    stances: list[Stance],
     stands_first: bool,
 ) -> Clip:
-    """Make a clip that is played once, or an idle that repeats.
+    """Make a clip that is played once, or an idle that repeats; without foot events.
 
     The root of clips in place stands below the pelvis, faces as the feet do and does not move; that of
     others follows the pelvis, averaged, and faces as the feet do where somebody stands first.
@@ -57,7 +55,6 @@ def plain_clip(
     if kind is ClipKind.IDLE and len(rotation) > 2:
         rotation, pelvis = close_seam(rotation, pelvis, skeleton)
     start = about(1, -heading[:1])
-    events = tuple(sorted(event for stance in stances for event in stance.events))
     return Clip(
         name,
         kind,
@@ -67,7 +64,6 @@ def plain_clip(
         rotate(start, root - root[:1]),
         heading - heading[0],
         is_cyclic=kind is ClipKind.IDLE,
-        foot_events=() if kind in IN_PLACE else events,
     )
 
 

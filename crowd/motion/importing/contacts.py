@@ -219,6 +219,9 @@ def find_stances(contacts: Contacts, rate: float) -> list[Stance]:
     for foot in range(2):
         fore_foot = np.asarray(contacts.is_down[:, foot, BALL:].any(axis=1))
         for begin, end in intervals(contacts.foot_is_down[:, foot], rate, contacts.is_loop):
+            if end <= begin:
+                # What one frame at an end shows is no stance.
+                continue
             front = within(fore_foot, begin, end, rate, contacts.is_loop)
             heel = within(contacts.is_down[:, foot, HEEL], begin, end, rate, contacts.is_loop)
             flat = front[0] if front else begin

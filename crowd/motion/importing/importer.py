@@ -14,7 +14,7 @@ from crowd.errors import MotionError, describe
 from crowd.motion.clip import Clip, ClipKind, ClipQuality, FootEvent, JointMask
 from crowd.motion.importing.axes import PosedSource, convert, find_convention, rest_positions
 from crowd.motion.importing.classify import jump_labels, kind_of, look_at, reach_labels
-from crowd.motion.importing.clips import facing_of_feet, plain_clip, stance_drift
+from crowd.motion.importing.clips import IN_PLACE, facing_of_feet, plain_clip, stance_drift
 from crowd.motion.importing.contacts import Contacts, Stance, find_contacts, find_stances, sole_heights
 from crowd.motion.importing.cycles import (
     Window,
@@ -28,8 +28,9 @@ from crowd.motion.importing.cycles import (
 )
 from crowd.motion.importing.joint_names import JointMap, read_mapping
 from crowd.motion.importing.joint_shape import recognise
-from crowd.motion.importing.labels import Correction
+from crowd.motion.importing.labels import Correction, JumpCorrection, ReachCorrection
 from crowd.motion.importing.retarget import Retargeted, retarget
+from crowd.motion.procedural.gait import steady_path
 from crowd.motion.rotation import conjugate, continuous, multiply, slerp, to_vector
 from crowd.motion.skeleton import Skeleton
 from crowd.motion.source import SourceMotion
@@ -86,6 +87,8 @@ class Imported:
         Frames that were mended.
     captured : (float, float, float) or None
         Forward m/s, turn rad/s and side m/s in the size of the source; of gaits.
+    stances : tuple of Stance
+        In times of the source, after what was cut off at its start, s.
     """
 
     clip: Clip
@@ -95,6 +98,7 @@ class Imported:
     unused_joints: tuple[str, ...]
     popped: int
     captured: tuple[float, float, float] | None
+    stances: tuple[Stance, ...] = ()
 
 
 def import_clip(
@@ -135,15 +139,33 @@ def import_clip(
     loops = is_loop(moved, skeleton) if told.cyclic is None else told.cyclic
     if loops:
         contacts = find_contacts(source, joints, is_loop=True)
-    stances = told_stances(motion, told, source) or find_stances(contacts, source.frame_rate)
-    tags = dict(motion.tags)
+    told_ones = told_stances(motion, told, source)
+    stances = told_ones or find_stances(contacts, source.frame_rate)
+    offset = told.begin or 0.0
+    tags = {name: time - offset for name, time in motion.tags}
     clip, window = make_clip(motion.name, moved, contacts, stances, skeleton, told, tags, loops)
+    if loops and window is None:
+        # A loop that is no gait is played once: its stances end with it.
+        stances = told_ones or find_stances(replace(contacts, is_loop=False), source.frame_rate)
+    if window is None:
+        stances = within_clip(stances, clip.duration)
+        events = tuple(sorted(event for stance in stances for event in stance.events))
+        clip = replace(clip, foot_events=() if clip.kind in IN_PLACE else events)
     captured = None if window is None else captured_parameters(moved, window)
     clip = corrected(clip, told, moved.scale, motion)
     drift = stance_drift(clip, skeleton) if clip.foot_events else 0.0
     quality = replace(clip.quality or ClipQuality(), stance_drift=drift)
     clip = replace(clip, quality=quality, source=motion.path.name)
-    return Imported(clip, joints.family, convention.text, moved.scale, joints.unused, popped, captured)
+    return Imported(
+        clip,
+        joints.family,
+        convention.text,
+        moved.scale,
+        joints.unused,
+        popped,
+        captured,
+        tuple(stances) if clip.foot_events else (),
+    )
 
 
 def make_clip(
@@ -174,16 +196,22 @@ def make_clip(
             )
         clip = cyclic_clip(name, motion, skeleton, window)
         return replace(clip, quality=ClipQuality(seam=window.seam)), window
-    clip = plain_clip(name, kind, motion, skeleton, stances, motions.stands_first)
+    clip = plain_clip(name, kind, motion, skeleton, motions.stands_first)
     headings = heading_of(motion.rotation_local[:1, 0])
     yaw = float((facing_of_feet(motion, skeleton) if motions.stands_first else headings)[0])
     if kind is ClipKind.GESTURE:
         clip = replace(clip, mask=JointMask.UPPER_BODY)
     if kind is ClipKind.JUMP:
-        jump = jump_labels(motion, motions, dict(tags), yaw)
+        jump = jump_labels(motion, motions, tags, yaw, told.jump or JumpCorrection())
+        if jump is None:
+            allowed = "jump = { take_off = ..., landing = ... } in the file of labels"
+            raise MotionError(
+                describe(f'clip "{name}"', "no time is found with both feet in the air", None, allowed)
+            )
         clip = replace(clip, jump=jump, quality=ClipQuality(flight_gravity=motions.flight_gravity))
     if kind is ClipKind.REACH:
-        clip = replace(clip, reach=reach_labels(motion, motions, skeleton, dict(tags), yaw))
+        reach = reach_labels(motion, motions, skeleton, tags, yaw, told.reach or ReachCorrection())
+        clip = replace(clip, reach=reach)
     return clip, None
 
 
@@ -279,6 +307,20 @@ def told_stances(motion: SourceMotion, told: Correction, source: PosedSource) ->
     return sorted(found, key=lambda stance: (stance.strike, stance.foot))
 
 
+def within_clip(stances: list[Stance], duration: float) -> list[Stance]:
+    """Stances that begin in a clip, ending with it at the latest."""
+    return [
+        replace(
+            stance,
+            flat=min(stance.flat, duration),
+            rises=min(stance.rises, duration),
+            leaves=min(stance.leaves, duration),
+        )
+        for stance in stances
+        if stance.strike < duration
+    ]
+
+
 def _between(times: list[float], low: float, high: float, otherwise: float) -> float:
     return next((time for time in sorted(times) if low <= time <= high), otherwise)
 
@@ -296,19 +338,16 @@ def corrected(clip: Clip, told: Correction, scale: float, motion: SourceMotion) 
         if clip.kind is not ClipKind.LOCOMOTION:
             raise MotionError(describe(where, "speeds are for locomotion", clip.kind.value))
         forward, turn, side = clip.parameters
-        clip = replace(
-            clip,
-            parameters=(
-                forward if told.forward is None else told.forward * scale,
-                turn if told.turn is None else math.radians(told.turn),
-                side if told.side is None else told.side * scale,
-            ),
+        parameters = (
+            forward if told.forward is None else told.forward * scale,
+            turn if told.turn is None else math.radians(told.turn),
+            side if told.side is None else told.side * scale,
         )
-    if told.jump is not None:
-        if clip.jump is None:
-            raise MotionError(describe(where, "there is no jump in it", clip.kind.value))
-        changed = {key: value for key, value in told.jump.model_dump().items() if value is not None}
-        clip = replace(clip, jump=replace(clip.jump, **changed))
+        position, yaw = steady_path(*parameters)(np.linspace(0.0, clip.duration, clip.frame_count))
+        clip = replace(clip, parameters=parameters, root_position=position, root_yaw=yaw)
+    for kind, label in (("jump", clip.jump), ("reach", clip.reach)):
+        if getattr(told, kind) is not None and label is None:
+            raise MotionError(describe(where, f"there is no {kind} in it", clip.kind.value))
     return clip
 
 

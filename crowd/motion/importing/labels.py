@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from crowd.errors import MotionError, describe, nearest_first
-from crowd.motion.clip import Clip, ClipKind, FootEvent
+from crowd.motion.clip import ClipKind
+
+if TYPE_CHECKING:
+    from crowd.motion.importing.importer import Imported
 
 FILE_NAME = "crowd-labels.toml"
 Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -50,7 +54,7 @@ class Correction(_Table):
     cyclic: bool | None = None
     """Whether the last frame is the first one again."""
     events: tuple[tuple[Seconds, EventName], ...] | None = None
-    """Foot events of the cut clip."""
+    """Foot events, s from the first frame that is not cut off."""
     forward: Number | None = None
     """m/s, in the scale of the source."""
     turn: Number | None = None
@@ -102,37 +106,33 @@ def check_names(path: Path, labels: Mapping[str, Correction], names: Iterable[st
             raise MotionError(describe(str(path), "no clip has this name", name, nearest_first(name, known)))
 
 
-def write_labels(path: Path, clips: Iterable[Clip], scale: Mapping[str, float]) -> None:
-    """Write what was found, ready to be corrected.
+def write_labels(path: Path, found: Iterable[Imported]) -> None:
+    """Write what was found, ready to be corrected; reading it back changes nothing.
 
-    Parameters
-    ----------
-    path : Path
-    clips : iterable of Clip
-    scale : mapping of str to float
-        Leg ratio by clip name; speeds are written in the scale of the source.
+    Speeds are in the scale of the source, times from its first frame.
     """
     blocks = ["# What was found in each clip. Change what is wrong, delete what need not be told.\n"]
-    for clip in clips:
+    for entry in found:
+        clip = entry.clip
         lines = [f'["{clip.name}"]', f'kind = "{clip.kind.value}"']
         if clip.kind is ClipKind.LOCOMOTION:
             forward, turn, side = clip.parameters
-            ratio = scale.get(clip.name, 1.0)
             lines += [
-                f"forward = {forward / ratio:.4f}",
-                f"turn = {turn * 180 / 3.141592653589793:.3f}",
-                f"side = {side / ratio:.4f}",
+                f"forward = {forward / entry.scale:.6f}",
+                f"turn = {math.degrees(turn):.4f}",
+                f"side = {side / entry.scale:.6f}",
             ]
-        if clip.foot_events:
-            events = ", ".join(f'[{time:.4f}, "{FootEvent(event).name}"]' for time, event in clip.foot_events)
-            lines.append(f"# events from the first right heel strike: {events}")
+        if entry.stances:
+            events = sorted(event for stance in entry.stances for event in stance.events)
+            listed = ", ".join(f'[{time:.4f}, "{event.name}"]' for time, event in events)
+            lines.append(f"events = [{listed}]")
         if clip.jump:
             jump = clip.jump
             lines.append(
-                f"jump = {{ take_off = {jump.take_off:.3f}, apex = {jump.apex:.3f}, "
-                f"landing = {jump.landing:.3f} }}"
+                f"jump = {{ take_off = {jump.take_off:.4f}, apex = {jump.apex:.4f}, "
+                f"landing = {jump.landing:.4f} }}"
             )
         if clip.reach:
-            lines.append(f'reach = {{ side = "{clip.reach.side}", apex = {clip.reach.apex:.3f} }}')
+            lines.append(f'reach = {{ side = "{clip.reach.side}", apex = {clip.reach.apex:.4f} }}')
         blocks.append("\n".join(lines) + "\n")
     path.write_text("\n".join(blocks), "utf-8")
