@@ -52,13 +52,33 @@ def test_someone_covers_about_as_many_pixels_as_a_person_does(drawing, walkers, 
     assert span < tall.max() - tall.min() + 1 < 1.35 * span
 
 
-def test_two_people_differ_in_their_looks(drawing):
-    from crowd_viewer.looks import draw_looks
+def test_two_hundred_people_differ_in_their_looks(drawing):
+    from crowd.body import built_in_builds
+    from crowd_viewer.looks import draw_builds, draw_looks
 
-    looks = draw_looks(np.arange(200), 1.75)
+    recipes = [build.recipe for build in built_in_builds()]
+    identity, stature = np.arange(200), np.full(200, 1.70)
+    build = draw_builds(identity, stature, recipes)
+    looks = draw_looks(identity, build, recipes)
     assert len(np.unique(looks[:, 1, :3].round(3), axis=0)) > 190
-    assert (looks == draw_looks(np.arange(200), 1.75)).all()
+    assert len(np.unique(build)) == len(recipes)
+    assert np.bincount(build).max() < 40
+    assert (looks == draw_looks(identity, build, recipes)).all()
     assert np.isfinite(looks).all()
+
+
+def test_tall_people_are_more_often_men(drawing):
+    from crowd.body import built_in_builds
+    from crowd_viewer.looks import draw_builds
+
+    recipes = [build.recipe for build in built_in_builds()]
+    is_woman = np.array([recipe.is_woman for recipe in recipes])
+    shares = [
+        is_woman[draw_builds(np.arange(1000), np.full(1000, h), recipes)].mean() for h in (1.55, 1.69, 1.85)
+    ]
+    assert shares[0] > 0.95
+    assert shares[1] == pytest.approx(0.5, abs=0.06)
+    assert shares[2] < 0.05
 
 
 def test_a_recording_looks_like_the_run(drawing, tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from crowd_viewer.bodies import Mesh
+from crowd.body import Material, Skin
 
 
 def tube(start, end, radius, around, rings):
@@ -35,10 +35,11 @@ def tube_mesh(limbs, around):
         count += len(points)
     joints, weights = np.zeros((count, 4), np.uint8), np.zeros((count, 4), np.float32)
     joints[:, 0], weights[:, 0] = np.concatenate(joint), 1.0
-    return Mesh(
+    return Skin(
         np.concatenate(position).astype(np.float32),
         np.concatenate(normal).astype(np.float32),
         joints,
         weights,
+        np.full(count, Material.TOP, np.uint8),
         np.concatenate(triangle).astype(np.uint32),
     )

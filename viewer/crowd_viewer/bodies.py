@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from crowd.body import Figure, Material, Outfit, Recipe, Skin, built_in_builds
+from crowd.body.builds import is_built_in
 from crowd.motion.skeleton import Segment, Skeleton
 
 Float32Array = npt.NDArray[np.float32]
 FloatArray = npt.NDArray[np.float64]
 
 TRUNK, ARM, HAND = 0, 1, 2
+BY_PLACE = -1
+FIXED_MATERIAL = 8
+PLAIN = Recipe("plain", Figure(), Outfit())
 
 
 @dataclass(frozen=True)
@@ -26,47 +32,42 @@ class Limbs:
         m, from the ground below the root.
     radius : (C,) float64
         m.
+    material : (C,) int32
+        `Material`; `BY_PLACE` where it follows from the place on the body.
     """
 
     joint: npt.NDArray[np.int32]
     start: FloatArray
     end: FloatArray
     radius: FloatArray
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """A skin in rest pose.
-
-    Attributes
-    ----------
-    position, normal : (V, 3) float32
-        m, from the ground below the root.
-    joint : (V, 4) uint8
-    weight : (V, 4) float32
-        Share of each joint; they add up to 1.
-    triangle : (T, 3) uint32
-        Anticlockwise from outside.
-    """
-
-    position: Float32Array
-    normal: Float32Array
-    joint: npt.NDArray[np.uint8]
-    weight: Float32Array
-    triangle: npt.NDArray[np.uint32]
+    material: npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True)
 class Body:
-    """One build of body: skins from fine to coarse, none or as many as there are mesh levels, and limbs."""
+    """One build of body.
 
-    meshes: tuple[Mesh, ...]
+    Attributes
+    ----------
+    skins : tuple of Skin
+        From fine to coarse, none or as many as there are mesh levels.
+    limbs : Limbs
+    recipe : Recipe
+        What is worn where.
+    """
+
+    skins: tuple[Skin, ...]
     limbs: Limbs
+    recipe: Recipe = PLAIN
 
 
 def built_in_bodies(skeleton: Skeleton) -> tuple[Body, ...]:
-    """One body for each build; only limbs where the skeleton is not the built-in one."""
-    return (Body((), simple_limbs(skeleton)),)
+    """One body for each build; one of only limbs where the skeleton is not the built-in one."""
+    if not is_built_in(skeleton):
+        return (Body((), simple_limbs(skeleton)),)
+    return tuple(
+        Body(build.skins, dressed_limbs(skeleton, build.recipe), build.recipe) for build in built_in_builds()
+    )
 
 
 def rest_positions(skeleton: Skeleton) -> FloatArray:
@@ -141,7 +142,83 @@ def simple_limbs(skeleton: Skeleton) -> Limbs:
     add("spine_4", at("left_upper_arm", -0.02, -0.03, 0.0), at("right_upper_arm", 0.02, -0.03, 0.0), 0.066)
     add("neck_1", at("neck_1", 0.0, -0.03, 0.0), at("head", 0.0, 0.0, 0.005), 0.056)
     joint, start, end, radius = zip(*rows, strict=True)
-    return Limbs(np.array(joint, np.int32), np.array(start), np.array(end), np.array(radius))
+    return Limbs(
+        np.array(joint, np.int32),
+        np.array(start),
+        np.array(end),
+        np.array(radius),
+        np.full(len(joint), BY_PLACE, np.int32),
+    )
+
+
+def dressed_limbs(skeleton: Skeleton, recipe: Recipe) -> Limbs:
+    """Capsules of a build: thicker and thinner limbs, wide ones inside a skirt, hair, hat and bag."""
+    figure, outfit = recipe.figure, recipe.outfit
+    plain = simple_limbs(skeleton)
+    names = [skeleton.joint_names[joint] for joint in plain.joint]
+    factors = {
+        "spine_2": 0.5 * (figure.waist + figure.chest), "spine_3": figure.chest, "spine_4": figure.chest,
+        "pelvis": figure.hip, "head": figure.head, "neck_1": figure.neck, "thigh": figure.leg,
+        "shank": figure.leg, "upper_arm": figure.arm, "forearm": figure.arm, "hand": figure.hand,
+    }  # fmt: skip
+    factor = np.array([factors.get(name, factors.get(name.split("_", 1)[-1], 1.0)) for name in names])
+    radius = plain.radius * factor
+    start, end = plain.start.copy(), plain.end.copy()
+    around = np.array([name in ("pelvis", "spine_2", "spine_3") for name in names])
+    start[around, 0] *= factor[around]
+    end[around, 0] *= factor[around]
+    hem = outfit.hem if outfit.hangs else outfit.bottom_hem if outfit.bottom == "skirt" else 1.0
+    if hem < 0.85:
+        for part in ("thigh", "shank"):
+            is_in = np.array([name.endswith(part) for name in names])
+            covered = hem < 0.70 if part == "thigh" else hem < 0.45
+            radius[is_in] += 0.022 * covered
+    extra = list(_extra_limbs(skeleton, outfit))
+    joint, more_start, more_end, more_radius, material = zip(*extra, strict=True) if extra else ((),) * 5
+    return Limbs(
+        np.append(plain.joint, np.array(joint, np.int32)),
+        np.vstack([start, np.array(more_start).reshape(-1, 3)]),
+        np.vstack([end, np.array(more_end).reshape(-1, 3)]),
+        np.append(radius, more_radius),
+        np.append(plain.material, np.array(material, np.int32)),
+    )
+
+
+def _extra_limbs(
+    skeleton: Skeleton, outfit: Outfit
+) -> Iterator[tuple[int, tuple[float, ...], tuple[float, ...], float, int]]:
+    """Capsules of hair, hat and bag."""
+    head, chest = skeleton.joint("head"), skeleton.joint("spine_4")
+    hair, extra = int(Material.HAIR), int(Material.EXTRA)
+    if outfit.hat == "scarf":
+        yield head, (0.0, 1.66, -0.010), (0.0, 1.55, -0.020), 0.092, extra
+    elif outfit.hat:
+        yield head, (0.0, 1.70, -0.006), (0.0, 1.69, -0.012), 0.094, extra
+    elif outfit.hair != "bald":
+        size = 0.112 if outfit.hair == "curls" else 0.096
+        yield head, (0.0, 1.675, -0.020), (0.0, 1.64, -0.030), size, hair
+    if outfit.hair in ("bob", "long") and outfit.hat != "scarf":
+        low = 1.53 if outfit.hair == "bob" else 1.42
+        yield head, (0.0, 1.64, -0.045), (0.0, low, -0.065), 0.075, hair
+    if outfit.hair == "ponytail":
+        yield head, (0.0, 1.68, -0.130), (0.0, 1.45, -0.130), 0.026, hair
+    if outfit.bag == "backpack":
+        yield chest, (0.0, 1.34, -0.190), (0.0, 1.14, -0.190), 0.105, extra
+    if outfit.bag == "shoulder":
+        yield skeleton.joint("spine_1"), (0.22, 0.90, -0.02), (0.22, 0.88, -0.02), 0.085, extra
+
+
+def worn_where(recipe: Recipe) -> FloatArray:
+    """Heights at which clothes end on limbs, for shaders. (3, 4).
+
+    Sleeve, hem of the top, hem of the bottom, shoe; then whether there is hair, and zeros.
+    """
+    outfit = recipe.outfit
+    has_hair = outfit.hair != "bald" and outfit.hat != "scarf"
+    rows = np.zeros((3, 4))
+    rows[0] = outfit.sleeve, outfit.hem, outfit.bottom_hem if outfit.bottom else outfit.hem, outfit.shoe
+    rows[1, 0] = has_hair
+    return rows
 
 
 def landmarks(skeleton: Skeleton) -> dict[str, str]:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
+
+from crowd.body import Recipe
 
 Float32Array = npt.NDArray[np.float32]
 FloatArray = npt.NDArray[np.float64]
 LOOK_COLUMNS = 8
+BUILD_PURPOSE = 90
+MIDDLE_STATURE, STATURE_APART, STATURE_SPREAD = 1.69, 0.13, 0.07
+OPEN_FRONT, ZIP = 4, 5
+"""Patterns of jackets and coats; 0 to 3 are plain, stripes, a band across the chest, and a print."""
 
 # Colours as seen on a screen, 0 to 255; how often each occurs stands in front.
 SKIN = (
@@ -16,8 +24,10 @@ SKIN = (
 )  # fmt: skip
 HAIR = (
     (8, 28, 22, 20), (7, 52, 36, 26), (5, 84, 58, 38), (3, 128, 92, 56), (2, 184, 146, 92),
-    (1, 122, 58, 34), (3, 128, 124, 120), (2, 196, 192, 186),
+    (1, 122, 58, 34), (2, 104, 100, 97), (1, 150, 146, 141),
 )  # fmt: skip
+DARK_HAIR = ((6, 22, 18, 17), (3, 34, 26, 23), (1, 110, 106, 104))
+GREY_HAIR = ((4, 118, 114, 110), (3, 166, 162, 156), (2, 84, 72, 64))
 TOPS = (
     (7, 36, 40, 48), (5, 66, 72, 82), (5, 40, 56, 88), (4, 232, 230, 224), (3, 190, 192, 194),
     (2, 128, 44, 46), (2, 70, 92, 72), (2, 178, 160, 132), (2, 92, 122, 160), (1, 208, 162, 60),
@@ -62,47 +72,90 @@ def _varied(colour: FloatArray, identity: npt.NDArray[np.int64], purpose: int, s
     return np.clip(colour * light[:, None] * tint, 0.003, 0.9)
 
 
-def draw_looks(identity: npt.NDArray[np.int64], stature: float) -> Float32Array:
+def draw_builds(
+    identity: npt.NDArray[np.int64], stature: FloatArray, recipes: Sequence[Recipe]
+) -> npt.NDArray[np.int32]:
+    """Draw a build for each person; taller people are more often men.
+
+    Parameters
+    ----------
+    identity : (P,) int64
+    stature : (P,) float64
+        m.
+    recipes : sequence of Recipe
+        Of the builds.
+
+    Returns
+    -------
+    (P,) int32
+        Places in `recipes`.
+
+    Notes
+    -----
+    **Source:** statures of adults are about normal with means 13 cm apart and a deviation of 7 cm within each
+    sex (order of ANSUR II), which makes the odds exponential in the stature.
+    """
+    often = np.array([recipe.often for recipe in recipes])
+    is_woman = np.array([recipe.is_woman for recipe in recipes])
+    if is_woman.all() or not is_woman.any():
+        share = np.full(len(identity), float(is_woman.all()))
+    else:
+        share = 1.0 / (1.0 + np.exp((stature - MIDDLE_STATURE) * STATURE_APART / STATURE_SPREAD**2))
+    wanted = chance(identity, BUILD_PURPOSE) < share
+    draw = chance(identity, BUILD_PURPOSE + 1)
+    build = np.zeros(len(identity), np.int32)
+    for sex in (False, True):
+        rows = np.flatnonzero(wanted == sex)
+        if rows.size:
+            bounds = np.cumsum(often * (is_woman == sex))
+            build[rows] = np.searchsorted(bounds, draw[rows] * bounds[-1], side="right")
+    return build
+
+
+def draw_looks(
+    identity: npt.NDArray[np.int64], build: npt.NDArray[np.int32], recipes: Sequence[Recipe]
+) -> Float32Array:
     """Draw looks.
 
     Parameters
     ----------
     identity : (P,) int64
         Stable number of each person.
-    stature : float
-        Height of the body in rest pose, m; cuts are places on it.
+    build : (P,) int32
+    recipes : sequence of Recipe
+        Of the builds.
 
     Returns
     -------
     (P, 8, 4) float32
-        Columns: skin and nape, top and sleeve end, bottom and its hem, hair and whether there is any, shoes
-        and their kind, accent and pattern, (belt, neck depth, stripes per metre, long hair), then
-        the waist.
+        Columns: skin and stubble, top, bottom, hair, shoes and their kind, accent and pattern, (belt, 0,
+        stripes per metre, 0), then the waist. What has no meaning is 0.
     """
     count = len(identity)
     look = np.zeros((count, LOOK_COLUMNS, 4))
+    is_woman = np.array([recipe.is_woman for recipe in recipes])[build]
+    is_old = np.array([recipe.is_old for recipe in recipes])[build]
+    outer = np.array([recipe.outfit.slack > 0.0135 and recipe.outfit.collar for recipe in recipes])[build]
 
     def share(purpose: int) -> FloatArray:
         return chance(identity, purpose)
 
     look[:, 0, :3] = _varied(_pick(SKIN, share(1)), identity, 11, 0.10)
-    look[:, 0, 3] = share(2) < 0.7
+    look[:, 0, 3] = np.where(is_woman, 0.0, np.maximum(1.6 * share(2) - 0.6, 0.0))
     look[:, 1, :3] = _varied(_pick(TOPS, share(3)), identity, 21, 0.28)
-    sleeve = share(4)
-    look[:, 1, 3] = stature * np.where(sleeve < 0.62, 0.488, np.where(sleeve < 0.74, 0.60, 0.705))
     look[:, 2, :3] = _varied(_pick(BOTTOMS, share(5)), identity, 31, 0.25)
-    hem = share(6)
-    look[:, 2, 3] = stature * np.where(hem < 0.86, 0.045, np.where(hem < 0.93, 0.125, 0.29))
-    look[:, 3, :3] = _varied(_pick(HAIR, share(7)), identity, 41, 0.2)
-    look[:, 3, 3] = share(8) > 0.06
+    hair = np.where(is_old[:, None], _pick(GREY_HAIR, share(7)), _pick(HAIR, share(7)))
+    # Dark skin goes with dark hair.
+    dark = np.clip((0.30 - look[:, 0, 0]) / 0.12, 0.0, 1.0)[:, None] * ~is_old[:, None]
+    hair = hair + dark * (_pick(DARK_HAIR, share(7)) - hair)
+    look[:, 3, :3] = _varied(hair, identity, 41, 0.2)
     look[:, 4, :3] = _varied(_pick(SHOES, share(9)), identity, 51, 0.2)
     look[:, 4, 3] = share(10) < 0.4
     look[:, 5, :3] = _varied(_pick(TOPS, share(61)), identity, 62, 0.3)
     pattern = share(63)
-    look[:, 5, 3] = np.digitize(pattern, (0.60, 0.71, 0.83, 0.90)) % 5
+    casual = np.digitize(pattern, (0.58, 0.74, 0.84)) % 4
+    look[:, 5, 3] = np.where(outer, np.where(pattern < 0.5, OPEN_FRONT, ZIP), casual)
     look[:, 6, 0] = share(64) < 0.4
-    look[:, 6, 1] = np.where(share(65) < 0.35, 0.9, 0.25)
     look[:, 6, 2] = 9.0 + 14.0 * share(66)
-    look[:, 6, 3] = share(67) < 0.42
-    look[:, 7, 0] = stature * np.where(share(68) < 0.35, 0.590, 0.535)
+    look[:, 7, 0] = np.array([recipe.outfit.waist for recipe in recipes])[build]
     return look.astype(np.float32)

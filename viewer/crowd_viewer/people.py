@@ -7,20 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from crowd.body import Skin
 from crowd_kernels.view import REACH, levels_crowd, pack_crowd, sort_rows
 from crowd_viewer.bodies import (
-    HAND,
-    TRUNK,
+    BY_PLACE,
+    FIXED_MATERIAL,
     Body,
-    Mesh,
     built_in_bodies,
     flesh_segments,
     joint_parts,
     landmarks,
     rest_positions,
+    worn_where,
 )
 from crowd_viewer.frame import CrowdFrame, Scene
-from crowd_viewer.looks import LOOK_COLUMNS, chance, draw_looks
+from crowd_viewer.looks import LOOK_COLUMNS, draw_builds, draw_looks
 from crowd_viewer.programs import MOST_JOINTS, compile_program
 from crowd_viewer.quality import Quality
 from crowd_viewer.tables import Table
@@ -33,7 +34,6 @@ MESH_LEVELS = 3
 LEVELS = 5
 FEW_LIMBS = 12
 """Limbs of people who are far away: trunk, head, arms and legs."""
-BUILD_PURPOSE = 90
 PALETTE_UNIT, ROOTS_UNIT, LOOKS_UNIT, LIMBS_UNIT, SHADOW_UNIT = range(5)
 
 
@@ -170,9 +170,11 @@ class People:
         changed = np.flatnonzero(frame.identity != self._identity)
         if changed.size:
             self._identity[changed] = frame.identity[changed]
-            builds = chance(frame.identity[changed], BUILD_PURPOSE) * self.build_count
-            self._build[changed] = builds.astype(np.int32)
-            self._look[changed] = draw_looks(frame.identity[changed], self.scene.skeleton.stature)
+            recipes = [body.recipe for body in self.bodies]
+            identity = frame.identity[changed]
+            build = draw_builds(identity, self.scene.stature[changed], recipes)
+            self._build[changed] = build
+            self._look[changed] = draw_looks(identity, build, recipes)
             self._looks.write(self._look.reshape(len(self._look), -1))
 
     def count_of_meshes(self) -> int:
@@ -193,7 +195,7 @@ class People:
     @property
     def has_meshes(self) -> bool:
         """There are bodies with a skin."""
-        return all(len(body.meshes) == MESH_LEVELS for body in self.bodies)
+        return all(len(body.skins) == MESH_LEVELS for body in self.bodies)
 
     def draw(self, kind: str) -> None:
         """Draw everyone: ``"colour"``, ``"shadow"`` or ``"identity"``."""
@@ -304,21 +306,24 @@ class People:
         self._blobs = context.vertex_array(self._blob_program, [(self._corners, "2f4", "corner")])
 
     def _fill_limbs(self) -> None:
-        """Write the limbs of all builds to a texture, one row a build; missing ones have no size."""
+        """Write what is worn where, then the limbs of all builds to a texture; missing ones have no size."""
         skeleton = self.scene.skeleton
         rest, part = rest_positions(skeleton), joint_parts(skeleton)
         self._limb_count = max(len(body.limbs.joint) for body in self.bodies)
-        table = np.zeros((self.build_count, self._limb_count, 3, 4), np.float32)
+        table = np.zeros((self.build_count, self._limb_count + 1, 3, 4), np.float32)
         table[:, :, 0, 3] = 1e-6
         for row, body in zip(table, self.bodies, strict=True):
-            limbs, filled = body.limbs, slice(0, len(body.limbs.joint))
+            row[0] = worn_where(body.recipe)
+            limbs, filled = body.limbs, slice(1, len(body.limbs.joint) + 1)
             row[filled, 0, :3] = limbs.start - rest[limbs.joint]
             row[filled, 0, 3] = limbs.radius
             row[filled, 1, :3] = limbs.end - rest[limbs.joint]
             row[filled, 1, 3] = np.searchsorted(self._few_joints, limbs.joint)
             row[filled, 2, :3] = rest[limbs.joint]
-            row[filled, 2, 3] = part[limbs.joint]
-        size = (3 * self._limb_count, self.build_count)
+            row[filled, 2, 3] = np.where(
+                limbs.material == BY_PLACE, part[limbs.joint], FIXED_MATERIAL + limbs.material
+            )
+        size = (3 * self._limb_count + 3, self.build_count)
         self._limbs = self.context.texture(size, 4, table.tobytes(), dtype="f4")
         self._limbs.filter = (self.context.NEAREST, self.context.NEAREST)
         self._feet = [skeleton.joint(f"{side}_foot") for side in ("left", "right")]
@@ -327,11 +332,10 @@ class People:
     def _fill_meshes(self) -> None:
         """Upload the skins of all builds and levels."""
         self._meshes: dict[tuple[str, int, int], moderngl.VertexArray] = {}
-        parts = joint_parts(self.scene.skeleton)
         for build, body in enumerate(self.bodies):
-            for level, mesh in enumerate(body.meshes):
-                vertices = self.context.buffer(vertex_bytes(mesh, parts))
-                triangles = self.context.buffer(np.ascontiguousarray(mesh.triangle, np.uint32).tobytes())
+            for level, skin in enumerate(body.skins):
+                vertices = self.context.buffer(vertex_bytes(skin))
+                triangles = self.context.buffer(np.ascontiguousarray(skin.triangle, np.uint32).tobytes())
                 for kind, program in self._mesh_programs.items():
                     layout = [
                         (form if name in program else f"{size}x", name) for form, size, name in VERTEX_LAYOUT
@@ -348,27 +352,24 @@ VERTEX_LAYOUT = (
     ("3f4", 12, "normal"),
     ("4u1", 4, "joint"),
     ("4f4", 16, "weight"),
-    ("2f4", 8, "part"),
+    ("1f4", 4, "material"),
 )
 
 
-def vertex_bytes(mesh: Mesh, parts: npt.NDArray[np.int32]) -> bytes:
+def vertex_bytes(skin: Skin) -> bytes:
     """Vertices of a skin as `VERTEX_LAYOUT` says."""
-    part = parts[mesh.joint]
     rows = np.zeros(
-        len(mesh.position),
+        len(skin.position),
         [
             ("position", "f4", 3),
             ("normal", "f4", 3),
             ("joint", "u1", 4),
             ("weight", "f4", 4),
-            ("part", "f4", 2),
+            ("material", "f4"),
         ],
     )
-    rows["position"], rows["normal"] = mesh.position, mesh.normal
-    rows["joint"], rows["weight"] = mesh.joint, mesh.weight
-    rows["part"][:, 0] = (mesh.weight * (part != TRUNK)).sum(axis=1)
-    rows["part"][:, 1] = (mesh.weight * (part == HAND)).sum(axis=1)
+    for _, _, name in VERTEX_LAYOUT:
+        rows[name] = getattr(skin, name)
     return rows.tobytes()
 
 

@@ -1,6 +1,7 @@
 // One quad for each limb that faces the eye; the fragment shader rounds it.
 in vec2 corner;
-uniform sampler2D limbs;   // three texels a limb, one row a build: start and radius, end and joint, rest and part
+uniform sampler2D limbs;   // a row a build: three texels of where clothes end, then three a limb:
+                           // start and radius, end and joint, rest and part
 uniform int limb_count;
 out vec2 across;
 out vec3 flat_place;
@@ -11,15 +12,18 @@ flat out vec4 end;         // w: radius, m
 flat out vec3 view;
 flat out vec3 side;
 flat out vec2 limb;
+flat out int worn;         // material + 1, 0 where it follows from the place
+flat out vec4 ends;
+flat out float has_hair;
 flat out int slot;
 
 void main() {
     int row = first + gl_InstanceID / limb_count;
     int number = gl_InstanceID % limb_count;
     Root root = root_of(row);
-    vec4 a = texelFetch(limbs, ivec2(3 * number, root.build), 0);
-    vec4 b = texelFetch(limbs, ivec2(3 * number + 1, root.build), 0);
-    vec4 c = texelFetch(limbs, ivec2(3 * number + 2, root.build), 0);
+    vec4 a = texelFetch(limbs, ivec2(3 * number + 3, root.build), 0);
+    vec4 b = texelFetch(limbs, ivec2(3 * number + 4, root.build), 0);
+    vec4 c = texelFetch(limbs, ivec2(3 * number + 5, root.build), 0);
     int joint = int(b.w + 0.5);
     vec4 turn = texelFetch(palette, palette_texel(row - palette_first, 2 * joint), 0);
     vec4 moved = texelFetch(palette, palette_texel(row - palette_first, 2 * joint + 1), 0) * REACH;
@@ -43,6 +47,9 @@ void main() {
     start = vec4((is_up ? a.xyz : b.xyz) + c.xyz, half_length / radius);
     end = vec4((is_up ? b.xyz : a.xyz) + c.xyz, radius);
     limb = vec2(c.w == 1.0 || c.w == 2.0 ? 1.0 : 0.0, c.w == 2.0 ? 1.0 : 0.0);
+    worn = c.w > 7.5 ? int(c.w - 6.5) : 0;
+    ends = texelFetch(limbs, ivec2(0, root.build), 0);
+    has_hair = texelFetch(limbs, ivec2(1, root.build), 0).x;
     rotation = turn;
     rotation_yaw = vec2(root.sine, root.cosine);
     slot = root.slot;

@@ -11,56 +11,79 @@ vec4 look(int slot, int column) {
     return texelFetch(looks, ivec2((slot / ROWS) * LOOK_COLUMNS + column, slot % ROWS), 0);
 }
 
-// `at` and `normal` in rest pose; `limb`: share of the arm, and of the hand.
-Material clothes(int slot, vec3 at, vec3 normal, vec2 limb) {
-    vec4 skin = look(slot, 0), top = look(slot, 1), bottom = look(slot, 2), hair = look(slot, 3);
-    vec4 shoe = look(slot, 4), accent = look(slot, 5), cut = look(slot, 6);
-    float waist = look(slot, 7).x;
-    float pixel = fwidth(at.y) + 1e-5;
-    bool is_arm = limb.x > 0.5;
+const int SKIN = 0, TOP = 1, BOTTOM = 2, HAIR = 3, SHOE = 4, EXTRA = 5;
+
+Material face(vec4 skin, vec3 hair, vec3 at, float pixel) {
+    vec3 colour = skin.rgb;
+    float side = abs(at.x), ahead = at.z - HEAD_MIDDLE;
+    if (at.y > CHIN && ahead > 0.045) {
+        float cheek = length(vec2(side - 0.040, at.y - EYES + 0.036)) / 0.030;
+        colour = mix(colour, colour * vec3(1.05, 0.80, 0.76), 0.5 * exp(-cheek * cheek));
+        vec2 eye = vec2(side - 0.0315, at.y - EYES - 0.0005);
+        float open = length(eye * vec2(1.0, 1.9));
+        float white = 1.0 - smoothstep(0.0125, 0.0135 + pixel, open);
+        colour = mix(colour, vec3(0.62, 0.60, 0.57), 0.85 * white);
+        colour = mix(colour, vec3(0.035, 0.022, 0.016), white * (1.0 - smoothstep(0.0050, 0.0060 + pixel, length(eye))));
+        float lid = abs(open - 0.0135) + max(-eye.y, 0.0) * 0.6;
+        colour = mix(colour, vec3(0.05, 0.03, 0.025), 0.75 * (1.0 - smoothstep(0.0012, 0.0030 + pixel, lid)));
+        float brow = length(vec2((side - 0.034) * 0.42, (at.y - EYES - 0.0195 + 6.0 * (side - 0.03) * (side - 0.03)) * 2.2));
+        colour = mix(colour, hair * 0.7 + 0.1 * skin.rgb, 0.85 * (1.0 - smoothstep(0.007, 0.009 + pixel, brow)));
+        float lips = length(vec2(side * 0.40, at.y - MOUTH));
+        colour = mix(colour, skin.rgb * vec3(0.80, 0.48, 0.46), 0.85 * (1.0 - smoothstep(0.0075, 0.0105 + pixel, lips)));
+        colour *= 1.0 - 0.5 * (1.0 - smoothstep(0.0008, 0.0025 + pixel, abs(at.y - MOUTH) + max(side - 0.020, 0.0)));
+    }
+    return Material(colour, 0.06);
+}
+
+Material top_cloth(int slot, vec3 at, float pixel) {
+    vec4 top = look(slot, 1), accent = look(slot, 5), cut = look(slot, 6);
+    vec3 cloth = top.rgb;
     float side = abs(at.x);
-    // Head: hair above a line that falls from the brow to the nape.
-    if (at.y > CHIN && !is_arm) {
-        float ahead = at.z - HEAD_MIDDLE;
-        float line = HAIR_LINE + 0.62 * clamp(ahead, -0.05, 0.08) - 0.10 * step(0.02, -ahead) * skin.w;
-        float long_hair = cut.w * step(ahead, 0.005) * 0.20;
-        bool is_hair = at.y > line - long_hair && hair.w > 0.0 && !(side < 0.055 && ahead > 0.062 && at.y < BROW);
-        if (is_hair) return Material(hair.rgb * (0.85 + 0.3 * normal.y), 0.10);
-        vec3 face = skin.rgb;
-        float eyes = length(vec2(side - 0.032, (at.y - EYES) * 1.6));
-        if (ahead > 0.05) {
-            face = mix(face, vec3(0.05, 0.04, 0.035), 1.0 - smoothstep(0.010, 0.012 + pixel, eyes));
-            float brow = length(vec2((side - 0.033) * 0.45, (at.y - EYES - 0.021) * 2.4));
-            face = mix(face, hair.rgb * 0.6 + 0.2 * skin.rgb, 0.8 * (1.0 - smoothstep(0.008, 0.010 + pixel, brow)));
-            float mouth = length(vec2(side * 0.42, (at.y - MOUTH) * 2.2));
-            face = mix(face, skin.rgb * vec3(0.74, 0.46, 0.44), 0.8 * (1.0 - smoothstep(0.008, 0.011 + pixel, mouth)));
-        }
-        return Material(face, 0.05);
+    int pattern = int(accent.w + 0.5);
+    float wave = abs(fract(at.y * cut.z) - 0.5) * 2.0;
+    if (pattern == 1) cloth = mix(cloth, accent.rgb, smoothstep(0.5 - 4.0 * pixel * cut.z, 0.5 + 4.0 * pixel * cut.z, wave));
+    if (pattern == 2 && at.y < CHEST + 0.06 && at.y > CHEST - 0.06) cloth = accent.rgb;
+    if (pattern == 3 && at.z > 0.0) {
+        vec2 print = vec2(side / 0.085, (at.y - CHEST + 0.06) / 0.075);
+        cloth = mix(cloth, accent.rgb, 0.85 * (1.0 - smoothstep(0.9, 0.95 + 8.0 * pixel, max(print.x, abs(print.y)))));
     }
-    if (is_arm) {
-        if (limb.y > 0.5 || at.y < top.w) return Material(skin.rgb, 0.05);
-        float cuff = smoothstep(0.028 + pixel, 0.028, at.y - top.w);
-        return Material(mix(top.rgb, top.rgb * 0.72, cuff), 0.03);
+    if (pattern == 4 && at.z > 0.0) {
+        float open = 0.016 + 0.10 * clamp(at.y - CHEST + 0.35, 0.0, 0.5);
+        cloth = mix(cloth, accent.rgb, 1.0 - smoothstep(open, open + 0.003 + pixel, side));
+        cloth *= 1.0 - 0.5 * (1.0 - smoothstep(0.002, 0.006 + pixel, abs(side - open)));
     }
-    if (at.y < SHOE_TOP + 0.02 * shoe.w) {
+    if (pattern == 5 && at.z > 0.0 && side < 0.004 + 0.5 * pixel) cloth *= 0.5;
+    return Material(cloth, 0.03);
+}
+
+// `piece`: what it belongs to; `at` and `normal` in rest pose.
+Material clothes(int slot, int piece, vec3 at, vec3 normal) {
+    float pixel = fwidth(at.y) + 1e-5;
+    if (piece == SKIN) return face(look(slot, 0), look(slot, 3).rgb, at, pixel);
+    if (piece == TOP) return top_cloth(slot, at, pixel);
+    if (piece == BOTTOM) {
+        float belt = look(slot, 6).x * step(look(slot, 7).x - 0.035, at.y);
+        return Material(mix(look(slot, 2).rgb, vec3(0.05, 0.035, 0.025), belt), 0.03);
+    }
+    if (piece == HAIR) return Material(look(slot, 3).rgb * (0.85 + 0.3 * normal.y), 0.10);
+    if (piece == SHOE) {
+        vec4 shoe = look(slot, 4);
         float sole = smoothstep(0.020 + pixel, 0.020, at.y);
         return Material(mix(shoe.rgb, mix(shoe.rgb * 0.4, vec3(0.75), step(0.5, shoe.w)), sole), 0.12);
     }
-    float neck = NECK_LINE + 0.28 * side - cut.y * max(at.z - HEAD_MIDDLE + 0.03, 0.0);
-    if (at.y > neck) return Material(skin.rgb, 0.05);
-    if (at.y > waist) {
-        vec3 cloth = top.rgb;
-        int pattern = int(accent.w + 0.5);
-        float wave = abs(fract(at.y * cut.z) - 0.5) * 2.0;
-        if (pattern == 1) cloth = mix(cloth, accent.rgb, smoothstep(0.5 - 4.0 * pixel * cut.z, 0.5 + 4.0 * pixel * cut.z, wave));
-        if (pattern == 2 && at.z > 0.0) cloth = mix(cloth, accent.rgb, 1.0 - smoothstep(0.055, 0.058 + pixel, side));
-        if (pattern == 3 && at.y < CHEST + 0.06 && at.y > CHEST - 0.06) cloth = accent.rgb;
-        if (pattern == 4 && at.z > 0.0 && side < 0.006 + 0.5 * pixel) cloth *= 0.5;
-        return Material(cloth, 0.03);
+    return Material(look(slot, 5).rgb, 0.05);
+}
+
+// The piece that a place on a capsule belongs to; `limb`: share of the arm, and of the hand; `ends` of clothes.
+int piece_at(vec3 at, vec2 limb, vec4 ends, bool has_hair) {
+    if (limb.x > 0.5) return limb.y > 0.5 || at.y < ends.x ? SKIN : TOP;
+    if (at.y > CHIN) {
+        float ahead = at.z - HEAD_MIDDLE;
+        float line = HAIR_LINE + 0.62 * clamp(ahead, -0.05, 0.08) - 0.10 * step(0.02, -ahead);
+        return at.y > line && has_hair ? HAIR : SKIN;
     }
-    if (at.y > bottom.w) {
-        float belt = cut.x * step(waist - 0.035, at.y);
-        return Material(mix(bottom.rgb, vec3(0.05, 0.035, 0.025), belt), 0.03);
-    }
-    return Material(skin.rgb, 0.05);
+    if (at.y < max(ends.w - 0.04, 0.06)) return SHOE;
+    if (at.y > NECK_LINE + 0.28 * abs(at.x)) return SKIN;
+    if (at.y > ends.y) return TOP;
+    return at.y > ends.z ? BOTTOM : SKIN;
 }

@@ -2,7 +2,7 @@ in vec3 place;
 in vec3 facing;
 in vec3 rest_place;
 in vec3 rest_normal;
-in vec2 limb;
+flat in int piece;
 flat in int slot;
 
 #if defined(SHADOW)
@@ -15,7 +15,7 @@ out vec4 colour;
 
 void main() {
     vec3 normal = normalize(facing);
-    Material material = clothes(slot, rest_place, normalize(rest_normal), limb);
+    Material material = clothes(slot, piece, rest_place, normalize(rest_normal));
     colour = displayed(hazy(lit(material.colour, material.gloss, place, normal), place));
     if (slot == picked) colour.rgb = mix(colour.rgb, vec3(1.0, 0.72, 0.1), 0.45);
 }

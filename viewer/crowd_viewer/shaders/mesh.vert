@@ -2,13 +2,13 @@ in vec3 position;
 in vec3 normal;
 in uvec4 joint;
 in vec4 weight;
-in vec2 part;              // share of the arm and of the hand in the vertex
+in float material;
 uniform vec3 rest[MOST_JOINTS];
 out vec3 place;
 out vec3 facing;
 out vec3 rest_place;
 out vec3 rest_normal;
-out vec2 limb;
+flat out int piece;
 flat out int slot;
 
 void main() {
@@ -26,7 +26,7 @@ void main() {
     facing = to_world_direction(root, direction);
     rest_place = position;
     rest_normal = normal;
-    limb = part;
+    piece = int(material + 0.5);
     slot = root.slot;
     gl_Position = to_clip * vec4(place, 1.0);
 }
