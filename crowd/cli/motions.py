@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,14 +12,14 @@ import typer
 from crowd.errors import SettingsError, describe
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from crowd.motion.clip import Clip
     from crowd.motion.importing.example_set import Coverage
     from crowd.motion.importing.folder import ImportReport
+    from crowd.motion.library import Calibration, MotionLibrary
 
-LEAST_WIDTH = 170
-"""Columns of a table, also where the terminal has fewer."""
+MOST_NAMES = 6
+"""Examples of a need that are listed by name."""
+CALIBRATION_POINTS = 120
 
 Parameters = tuple[float, float, float]
 
@@ -48,6 +48,7 @@ def import_(
     licence: Annotated[Path | None, typer.Option(help="Licence text; those beside the files.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw the parameter space.")] = None,
     fill: Annotated[bool, typer.Option(help="Fill gaps from the built-in library.")] = True,
+    calibrate: Annotated[bool, typer.Option(help="Measure realised against asked motion.")] = True,
     strict: Annotated[bool, typer.Option(help="Stop at the first file that cannot be used.")] = False,
 ) -> int:
     """Read motion files, find their labels, and write a library that crowds run on."""
@@ -85,13 +86,18 @@ def import_(
             ),
         )
     print_report(report)
-    save_library(out, report.examples.library)
+    library = report.examples.library
+    if calibrate:
+        with Console(stderr=True).status("measuring realised against asked motion"):
+            library = calibrated(library)
+        print_calibration(library.calibration)
+    save_library(out, library)
     print(f"wrote {out}")
     if write_labels is not None:
         label_files.write_labels(write_labels, report.imported)
         print(f"wrote {write_labels}")
     if picture is not None:
-        _draw(report.examples.library, picture)
+        _draw(library, picture)
     return 0
 
 
@@ -111,6 +117,7 @@ def show(
     print(f"{loaded.name}: {len(loaded.clips)} clips; source: {loaded.source}")
     print_clips(loaded.clips)
     print_coverage(coverage_of(loaded))
+    print_calibration(loaded.calibration)
     lines = loaded.licence.splitlines() or ["none stated"]
     print("\nlicence:" if licence else "\nlicence (first lines; --licence prints all):")
     print("\n".join(lines if licence else [line for line in lines if line.strip()][:4]))
@@ -150,92 +157,164 @@ def print_report(report: ImportReport) -> None:
         print(f"{clip}: {frames} frames popped and were mended")
     captured = {entry.clip.name: entry.captured for entry in report.imported}
     print_clips([entry.clip for entry in report.imported], captured)
+    twins: dict[str, list[str]] = {}
     for twin, kept in report.examples.duplicates:
-        print(f"{twin}: same parameters as {kept}, left out of the examples")
+        twins.setdefault(kept, []).append(twin)
+    for kept, others in twins.items():
+        print(f"left out, since {kept} says the same: {', '.join(others)}")
     print_coverage(report.examples.coverage)
     for file, reason in report.unusable:
         print(f"not usable: {file}: {reason}")
 
 
-def print_clips(
-    clips: list[Clip] | tuple[Clip, ...], captured: Mapping[str, Parameters | None] | None = None
-) -> None:
-    """Print the table of clips: what they serve, parameters, quality.
+def calibrated(library: MotionLibrary) -> MotionLibrary:
+    """Measure what a crowd on a library realises of what it is asked, and keep that in the library."""
+    from dataclasses import replace
+
+    from crowd.bench.sweep import sweep
+    from crowd.motion.library import Calibration
+
+    found = sweep(CALIBRATION_POINTS, library)
+    measured = Calibration(
+        found.points,
+        found.speed_rms_relative,
+        found.turn_rms_deg_s,
+        found.drift_mean_m,
+        found.drift_p95_m,
+    )
+    return replace(library, calibration=measured)
+
+
+def print_calibration(found: Calibration | None) -> None:
+    """Print how well what is asked is realised."""
+    if found is None:
+        print("realised against asked motion: not measured")
+        return
+    print(
+        f"realised against asked motion at {found.points} points of the locomotion space: speed "
+        f"{100 * found.speed_rms_relative:.2f} % rms, turn {found.turn_rms_deg_s:.3f} deg/s rms, "
+        f"planted feet drift {1000 * found.drift_mean_m:.2f} mm in the mean, "
+        f"{1000 * found.drift_p95_m:.2f} mm at 95 %"
+    )
+
+
+def print_clips(clips: Sequence[Clip], captured: Mapping[str, Parameters | None] | None = None) -> None:
+    """Print tables of clips, one for each kind: parameters, labels, quality.
 
     Parameters
     ----------
     clips : sequence of Clip
     captured : mapping, optional
-        Forward m/s, turn rad/s and side m/s in the size of the source, by clip; a column more.
+        Forward m/s, turn rad/s and side m/s in the size of the source, by clip; columns more.
     """
+    gaits = [clip for clip in clips if clip.kind.value == "locomotion"]
+    jumps = [clip for clip in clips if clip.jump is not None]
+    reaches = [clip for clip in clips if clip.reach is not None]
+    shown = {id(clip) for clip in (*gaits, *jumps, *reaches)}
+    others = [clip for clip in clips if id(clip) not in shown]
+    moves = ("forward m/s", "turn deg/s", "side m/s")
+    asked = {name: _moves(values) for name, values in (captured or {}).items() if values is not None}
+    sources = () if captured is None else tuple(f"captured {move}" for move in moves)
+    _print_rows(
+        ("locomotion", "s", *moves, *sources, "drift cm", "loop deg", "strikes"),
+        [
+            (
+                *_name_and_length(clip),
+                *_moves(clip.parameters),
+                *(() if captured is None else asked.get(clip.name, ("", "", ""))),
+                _drift(clip),
+                "" if clip.quality is None else f"{math.degrees(clip.quality.seam):.1f}",
+                _strikes(clip),
+            )
+            for clip in gaits
+        ],
+    )
+    air = ("take-off s", "apex s", "landing s", "length m", "in flight m", "rise m", "direction deg")
+    _print_rows(
+        ("jump", "s", *air, "flight m/s2", "drift cm"),
+        [
+            (
+                *_name_and_length(clip),
+                *(f"{value:.2f}" for value in (jump.take_off, jump.apex, jump.landing)),
+                *(f"{value:.2f}" for value in (jump.length, jump.flight_length, jump.rise)),
+                f"{math.degrees(jump.direction):.0f}",
+                "" if clip.quality is None else f"{clip.quality.flight_gravity:.1f}",
+                _drift(clip),
+            )
+            for clip in jumps
+            if (jump := clip.jump) is not None
+        ],
+    )
+    _print_rows(
+        ("reach", "s", "hand", "apex s", "left m", "up m", "ahead m"),
+        [
+            (
+                *_name_and_length(clip),
+                clip.reach.side,
+                f"{clip.reach.apex:.2f}",
+                *(f"{value:+.2f}" for value in clip.reach.hand_position),
+            )
+            for clip in reaches
+            if clip.reach is not None
+        ],
+    )
+    _print_rows(
+        ("other clip", "s", "serves", "drift cm", "strikes"),
+        [(*_name_and_length(clip), clip.kind.value, _drift(clip), _strikes(clip)) for clip in others],
+    )
+
+
+def _name_and_length(clip: Clip) -> tuple[str, str]:
+    return clip.name, f"{clip.duration:.2f}"
+
+
+def _moves(parameters: Parameters) -> tuple[str, str, str]:
+    # Adding 0 takes the sign of a mirrored zero away.
+    forward, turn, side = (value + 0.0 for value in parameters)
+    return f"{forward:.3f}", f"{math.degrees(turn):.1f}", f"{side:.3f}"
+
+
+def _drift(clip: Clip) -> str:
+    return "" if clip.quality is None else f"{100 * clip.quality.stance_drift:.1f}"
+
+
+def _strikes(clip: Clip) -> str:
+    return " ".join(
+        f"{event.name[0]}{time:.2f}" for time, event in clip.foot_events if event.name in ("RHS", "LHS")
+    )
+
+
+def _print_rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table without cutting its cells, which are copied from it; nothing where there are no rows."""
     from rich import box
+    from rich.console import Console
     from rich.table import Table
 
+    if not rows:
+        return
     table = Table(box=box.SIMPLE, pad_edge=False)
-    table.add_column("clip")
-    table.add_column("serves")
-    for heading in ("s", "forward m/s", "turn deg/s", "side m/s", "drift cm", "loop deg", "flight m/s2"):
-        table.add_column(heading, justify="right")
-    if captured is not None:
-        table.add_column("as captured", justify="right")
-    table.add_column("labels")
-    for clip in clips:
-        forward, turn, side = clip.parameters
-        quality = clip.quality
-        moves = clip.kind.value == "locomotion"
-        table.add_row(
-            clip.name,
-            clip.kind.value,
-            f"{clip.duration:.2f}",
-            *((f"{forward:.3f}", f"{math.degrees(turn):.1f}", f"{side:.3f}") if moves else ("", "", "")),
-            "" if quality is None else f"{100 * quality.stance_drift:.1f}",
-            "" if quality is None or not moves else f"{math.degrees(quality.seam):.1f}",
-            "" if quality is None or not quality.flight_gravity else f"{quality.flight_gravity:.1f}",
-            *(() if captured is None else (_captured_in_words(captured.get(clip.name)),)),
-            labels_in_words(clip),
-        )
-    print_wide(table)
+    for number, heading in enumerate(headings):
+        is_text = number == 0 or not _is_number(next((row[number] for row in rows if row[number]), "-"))
+        table.add_column(heading, justify="left" if is_text else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    needed = Console(width=10_000).measure(table).maximum
+    Console(width=needed).print(table)
 
 
-def _captured_in_words(parameters: Parameters | None) -> str:
-    if parameters is None:
-        return ""
-    forward, turn, side = parameters
-    return f"{forward:.3f} m/s, {math.degrees(turn):.1f} deg/s, {side:.3f} m/s"
-
-
-def print_wide(table: Table) -> None:
-    """Print a table without folding its cells: names and figures are copied from it."""
-    from rich.console import Console
-
-    for column in table.columns:
-        column.no_wrap = True
-    console = Console()
-    Console(width=max(console.width, LEAST_WIDTH)).print(table)
-
-
-def labels_in_words(clip: Clip) -> str:
-    """Labels of a clip in a few words: events, jump, reach."""
-    if clip.jump is not None:
-        jump = clip.jump
-        air = f"{jump.take_off:.2f}-{jump.landing:.2f} s"
-        return f"in the air {air}, {jump.length:.2f} m, rise {jump.rise:.2f} m"
-    if clip.reach is not None:
-        left, up, ahead = clip.reach.hand_position
-        place = f"{left:+.2f} left, {up:.2f} up, {ahead:+.2f} ahead"
-        return f"{clip.reach.side} hand at {clip.reach.apex:.2f} s: {place}"
-    strikes = [
-        f"{event.name[0]}{time:.2f}" for time, event in clip.foot_events if event.name in ("RHS", "LHS")
-    ]
-    return "strikes " + " ".join(strikes) if strikes else clip.source
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def print_coverage(coverage: tuple[Coverage, ...]) -> None:
     """Print what the examples cover and where they come from."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table("a crowd needs", "comes from", "examples", box=box.SIMPLE, pad_edge=False)
+    rows = []
     for entry in coverage:
-        table.add_row(entry.need, entry.origin, ", ".join(entry.clips))
-    print_wide(table)
+        named = ", ".join(entry.clips[:MOST_NAMES])
+        more = len(entry.clips) - MOST_NAMES
+        rows.append((entry.need, entry.origin, f"{named} and {more} more" if more > 0 else named))
+    _print_rows(("a crowd needs", "comes from", "examples"), rows)

@@ -8,6 +8,29 @@ from crowd.motion.skeleton import Skeleton
 
 
 @dataclass(frozen=True)
+class Calibration:
+    """How well a crowd on a library does what it is asked, measured over its whole locomotion space.
+
+    Attributes
+    ----------
+    points : int
+        Commands that were tried.
+    speed_rms_relative : float
+        Realised against asked speed.
+    turn_rms_deg_s : float
+        Realised against asked turn rate, deg/s.
+    drift_mean_m, drift_p95_m : float
+        Drift of planted feet in a stance, after foot locks, m.
+    """
+
+    points: int
+    speed_rms_relative: float
+    turn_rms_deg_s: float
+    drift_mean_m: float
+    drift_p95_m: float
+
+
+@dataclass(frozen=True)
 class MotionLibrary:
     """Clips on one skeleton.
 
@@ -19,6 +42,8 @@ class MotionLibrary:
         Names are unique.
     source, licence : str
         Where the motion comes from and the terms it may be used under.
+    calibration : Calibration or None
+        None while it has not been measured.
     """
 
     name: str
@@ -26,6 +51,7 @@ class MotionLibrary:
     clips: tuple[Clip, ...]
     source: str
     licence: str
+    calibration: Calibration | None = None
     _by_name: dict[str, Clip] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

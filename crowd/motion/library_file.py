@@ -12,7 +12,7 @@ import numpy as np
 
 from crowd.errors import MotionError, describe
 from crowd.motion.clip import Clip, ClipKind, ClipQuality, FootEvent, JointMask, JumpLabels, ReachLabels
-from crowd.motion.library import MotionLibrary
+from crowd.motion.library import Calibration, MotionLibrary
 from crowd.motion.skeleton import Skeleton
 
 FORMAT = 1
@@ -41,6 +41,8 @@ def save_library(path: str | os.PathLike[str], library: MotionLibrary) -> None:
             file.attrs["source"] = library.source
             # Texts of licences outgrow attributes.
             file.create_dataset("licence", data=library.licence)
+            if library.calibration is not None:
+                file.create_group("calibration").attrs.update(asdict(library.calibration))
             write_skeleton(file.create_group("skeleton"), library.skeleton)
             clips = file.create_group("clips")
             for number, clip in enumerate(library.clips):
@@ -80,6 +82,7 @@ def load_library(path: str | os.PathLike[str]) -> MotionLibrary:
                 clips,
                 str(file.attrs["source"]),
                 str(file["licence"].asstr()[()]),
+                _calibration(file["calibration"].attrs) if "calibration" in file else None,
             )
     except (OSError, KeyError, ValueError, RuntimeError, TypeError) as error:
         raise MotionError(describe(str(place), "is no motion library", str(error))) from error
@@ -151,6 +154,11 @@ def read_clip(group: Any) -> Clip:
 
 def _numbers(attributes: Any) -> dict[str, float]:
     return {key: float(value) for key, value in attributes.items()}
+
+
+def _calibration(attributes: Any) -> Calibration:
+    numbers = {key: float(value) for key, value in attributes.items()}
+    return Calibration(points=int(numbers.pop("points")), **numbers)
 
 
 def _reach(attributes: Any) -> ReachLabels:

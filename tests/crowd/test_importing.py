@@ -12,7 +12,7 @@ from crowd.motion.body import build_skeleton
 from crowd.motion.clip import ClipKind, FootEvent
 from crowd.motion.importing.axes import UNITS, convert, find_convention
 from crowd.motion.importing.clips import mirrored, stance_drift
-from crowd.motion.importing.example_set import NEEDS, assemble, distance
+from crowd.motion.importing.example_set import NEEDS, OTHER_NEEDS, assemble, distance
 from crowd.motion.importing.importer import ImportSettings, import_clip
 from crowd.motion.importing.joint_names import FAMILIES, REQUIRED, map_joints, normalised, read_mapping
 from crowd.motion.importing.labels import (
@@ -22,6 +22,7 @@ from crowd.motion.importing.labels import (
     read_labels,
     write_labels,
 )
+from crowd.motion.library import Calibration
 from crowd.motion.library_file import load_library, save_library
 from crowd.motion.procedural import built_in_library
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, slerp, swing, to_vector
@@ -360,8 +361,9 @@ def test_missing_sides_are_mirrored_and_gaps_are_filled_and_named():
     assert origin["sidestep to the right"] == "mirrored"
     assert origin["walking backward"] == "built-in library"
     assert origin["turning left on the spot"] == "built-in library"
-    assert {need.name for need in NEEDS} == set(origin)
-    assert "missing" not in origin.values()
+    assert origin["standing idle"] == origin["gestures"] == "built-in library"
+    assert {need.name for need in (*NEEDS, *OTHER_NEEDS)} == set(origin)
+    assert all(origin[need.name] != "missing" for need in NEEDS)
     bare = assemble(clips, "test", "us", "MIT", fills=False)
     assert {entry.origin for entry in bare.coverage} >= {"missing"}
 
@@ -375,13 +377,24 @@ def test_examples_that_say_the_same_are_kept_once():
         assert all(distance(first, other) > 0.01 for other in parameters[:number])
 
 
+def test_a_motion_that_two_files_hold_is_kept_once():
+    wave = LIBRARY.clip("wave")
+    moved = wave.pelvis_position_root + np.float32([0.0, 0.02, 0.0])
+    clips = [wave, replace(wave, name="wave_copy"), replace(wave, name="lower", pelvis_position_root=moved)]
+    examples = assemble(clips, "test", "us", "MIT", fills=False)
+    assert examples.duplicates == (("wave_copy", "wave"),)
+    assert [clip.name for clip in examples.library.clips] == ["wave", "lower"]
+
+
 def test_a_library_file_holds_everything(tmp_path):
     jump = import_clip(jump_motion(0.5, 1.0), SKELETON).clip
     library = assemble([LIBRARY.clip("walk"), jump], "mine", "me", "All rights\nréservés").library
+    library = replace(library, calibration=Calibration(50, 0.01, 0.2, 0.003, 0.004))
     path = tmp_path / "mine.h5"
     save_library(path, library)
     again = load_library(path)
     assert (again.name, again.source, again.licence) == (library.name, library.source, library.licence)
+    assert again.calibration == library.calibration
     assert again.skeleton.joint_names == library.skeleton.joint_names
     for first, second in zip(again.clips, library.clips, strict=True):
         assert np.array_equal(first.rotation_local, second.rotation_local)

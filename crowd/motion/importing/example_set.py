@@ -25,6 +25,8 @@ ASIDE = 0.25
 BUILT_IN = "built-in library"
 ALWAYS_FILLED = (ClipKind.GESTURE, ClipKind.START, ClipKind.STOP)
 """Kinds that the built-in library adds by name, because scenarios ask for them."""
+SAME_TURN, SAME_WAY = math.radians(1.0), 0.005
+"""Clips whose joints and pelvis are nowhere farther apart hold one motion, rad and m."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,37 @@ NEEDS = (
 
 
 @dataclass(frozen=True)
+class OtherNeed:
+    """What a crowd does besides locomotion.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    holds : callable
+        Whether a clip serves it.
+    """
+
+    name: str
+    holds: Callable[[Clip], bool]
+
+
+OTHER_NEEDS = (
+    OtherNeed("standing idle", lambda clip: clip.kind is ClipKind.IDLE),
+    OtherNeed("starting to walk", lambda clip: clip.kind is ClipKind.START),
+    OtherNeed("stopping", lambda clip: clip.kind is ClipKind.STOP),
+    OtherNeed("gestures", lambda clip: clip.kind is ClipKind.GESTURE),
+    OtherNeed("reaching with the right hand", lambda clip: _reaches(clip, "right")),
+    OtherNeed("reaching with the left hand", lambda clip: _reaches(clip, "left")),
+    OtherNeed("jumping", lambda clip: clip.jump is not None),
+)
+
+
+def _reaches(clip: Clip, side: str) -> bool:
+    return clip.reach is not None and clip.reach.side == side
+
+
+@dataclass(frozen=True)
 class Coverage:
     """Where the examples of one need come from.
 
@@ -111,7 +144,8 @@ class ExampleSet:
     library : MotionLibrary
     coverage : tuple of Coverage
     duplicates : tuple of (str, str)
-        Clips that say the same as another one and are left out, with that one.
+        Clips that say the same as another one and are left out, with that one: examples of locomotion with
+        the same parameters, others with the same motion.
     """
 
     library: MotionLibrary
@@ -154,7 +188,8 @@ def assemble(
     examples = kept + images
     if fills:
         examples += fillers(examples, built_in)
-    others = [clip for clip in clips if clip.kind is not ClipKind.LOCOMOTION]
+    others, twins = without_twins([clip for clip in clips if clip.kind is not ClipKind.LOCOMOTION])
+    duplicates += twins
     others += side_images(others, skeleton, refused)
     if fills:
         others += missing_others(others, built_in)
@@ -197,6 +232,29 @@ def without_duplicates(clips: Sequence[Clip]) -> tuple[list[Clip], list[tuple[st
     return sorted(kept, key=lambda clip: order[clip.name]), duplicates
 
 
+def without_twins(clips: Sequence[Clip]) -> tuple[list[Clip], list[tuple[str, str]]]:
+    """Keep one of the clips that hold one motion, such as a clip and its copy in another format."""
+    kept: list[Clip] = []
+    twins = []
+    for clip in clips:
+        twin = next((other for other in kept if is_twin(clip, other)), None)
+        if twin is None:
+            kept.append(clip)
+        else:
+            twins.append((clip.name, twin.name))
+    return kept, twins
+
+
+def is_twin(first: Clip, second: Clip) -> bool:
+    """Whether two clips hold one motion."""
+    if first.kind is not second.kind or first.rotation_local.shape != second.rotation_local.shape:
+        return False
+    if np.abs(first.pelvis_position_root - second.pelvis_position_root).max() > SAME_WAY:
+        return False
+    cosine = np.abs((first.rotation_local * second.rotation_local).sum(axis=-1)).min()
+    return bool(cosine > math.cos(0.5 * SAME_TURN))
+
+
 def fillers(examples: Sequence[Clip], built_in: MotionLibrary) -> list[Clip]:
     """Built-in examples for every need that no example meets."""
     added: list[Clip] = []
@@ -237,14 +295,15 @@ def side_images(clips: Sequence[Clip], skeleton: Skeleton, refused: set[str]) ->
 
 
 def missing_others(clips: Sequence[Clip], built_in: MotionLibrary) -> list[Clip]:
-    """Built-in clips that are no locomotion and that scenarios may ask for."""
+    """Built-in clips that are no locomotion: those that scenarios ask for, and those for unmet needs."""
     names = {clip.name for clip in clips}
-    has_idle = any(clip.kind is ClipKind.IDLE for clip in clips)
+    unmet = [need for need in OTHER_NEEDS if not any(need.holds(clip) for clip in clips)]
     return [
         replace(clip, source=BUILT_IN)
         for clip in built_in.clips
         if clip.name not in names
-        and (clip.kind in ALWAYS_FILLED or (clip.kind is ClipKind.IDLE and not has_idle))
+        and clip.kind is not ClipKind.LOCOMOTION
+        and (clip.kind in ALWAYS_FILLED or any(need.holds(clip) for need in unmet))
     ]
 
 
@@ -259,6 +318,9 @@ def coverage_of(library: MotionLibrary) -> tuple[Coverage, ...]:
     for need in NEEDS:
         clips = [clip for clip in library.of_kind(ClipKind.LOCOMOTION) if need.holds(*clip.parameters)]
         found.append(Coverage(need.name, origin_of(clips), tuple(clip.name for clip in clips)))
+    for other in OTHER_NEEDS:
+        clips = [clip for clip in library.clips if other.holds(clip)]
+        found.append(Coverage(other.name, origin_of(clips), tuple(clip.name for clip in clips)))
     return tuple(found)
 
 
@@ -273,4 +335,4 @@ def origin_of(clips: Sequence[Clip]) -> str:
     return "captured"
 
 
-__all__ = ["NEEDS", "Coverage", "ExampleSet", "assemble", "coverage_of"]
+__all__ = ["NEEDS", "OTHER_NEEDS", "Coverage", "ExampleSet", "assemble", "coverage_of"]
