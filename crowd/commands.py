@@ -131,6 +131,69 @@ class Commands:
         """Fade out what the characters play."""
         self._simulation.animation.stop(self._simulation.state, self._rows(characters))
 
+    def look_at(
+        self,
+        characters: Characters,
+        point_world: npt.ArrayLike | None = None,
+        *,
+        character: npt.ArrayLike | None = None,
+        object: npt.ArrayLike | None = None,
+        trunk: float = 1.0,
+    ) -> None:
+        """Let characters look at a point, another character or an object, until `look_away`.
+
+        What cannot be looked at, such as a point inside the own head, shows in ``state.gaze_status``.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+        point_world : (3,) or (M, 3) array, optional
+            One for all or one each, m.
+        character : int or (M,) int, optional
+            Whom to look at instead.
+        object : int or (M,) int, optional
+            Which object to look at instead.
+        trunk : float
+            How far waist and chest take part, 0 to 1.
+
+        Raises
+        ------
+        SettingsError
+            Not exactly one target is given, or it is of the wrong shape or number.
+        """
+        rows, gaze, state = self._rows(characters), self._simulation.gaze, self._simulation.state
+        given = [
+            name
+            for name, target in (("point", point_world), ("character", character), ("object", object))
+            if target is not None
+        ]
+        if len(given) != 1:
+            found = " and ".join(given) or "none of them"
+            raise SettingsError(
+                describe("look_at", "needs exactly one target", found, "one of point, character, object")
+            )
+        if not 0.0 <= trunk <= 1.0:
+            raise SettingsError(describe("look_at", "trunk is out of range", trunk, "0 to 1"))
+        if point_world is not None:
+            points = np.asarray(point_world, np.float64)
+            if points.shape not in ((3,), (rows.size, 3)):
+                raise SettingsError(
+                    describe(
+                        "look_at", "point has the wrong shape", points.shape, f"(3,) or ({rows.size}, 3)"
+                    )
+                )
+            gaze.look_at_point(state, rows, points, trunk)
+        elif character is not None:
+            others = self._rows(np.atleast_1d(np.asarray(character)))
+            gaze.look_at_character(state, rows, others if others.size > 1 else others[0], trunk)
+        else:
+            assert object is not None
+            gaze.look_at_object(state, rows, object, trunk)
+
+    def look_away(self, characters: Characters) -> None:
+        """Let the gaze of characters fade; idle glances may come again."""
+        self._simulation.gaze.release(self._simulation.state, self._rows(characters))
+
     def _rows(self, characters: Characters) -> npt.NDArray[np.int32]:
         capacity = self._simulation.state.capacity
         if isinstance(characters, slice):

@@ -30,6 +30,7 @@ def warm_up(progress: Callable[[str], None] | None = None, *, is_threaded: bool 
     gestures = simulation.model.library.of_kind(ClipKind.GESTURE)
     if gestures:
         simulation.commands.play(2, gestures[0].name)
+    simulation.commands.look_at(0, character=1)
 
     def note(stage: str) -> None:
         if progress is not None:

@@ -17,6 +17,7 @@ from crowd.commands import Commands
 from crowd.controllers.animation import Animation
 from crowd.controllers.controller import Controller, Step
 from crowd.controllers.foot_lock import FootLock
+from crowd.controllers.gaze import Gaze
 from crowd.controllers.idle import Idle
 from crowd.controllers.locomotion import Locomotion
 from crowd.controllers.world_offset import WorldOffset
@@ -110,11 +111,13 @@ class Simulation:
         self.idle = Idle(capacity)
         self.locomotion = Locomotion(capacity)
         self.animation = Animation(capacity)
+        self.gaze = Gaze(self.model.skeleton, capacity, self.navigator.avoidance)
         self.controllers: tuple[Controller, ...] = (
             self.world_offset,
             self.idle,
             self.locomotion,
             self.animation,
+            self.gaze,
         )
         self.foot_lock = FootLock(self.model.skeleton, capacity=capacity, dt=self.dt)
         self.joints = Joints(self.model.skeleton, capacity)

@@ -118,6 +118,49 @@ class State:
     play_queued_length: FloatArray = _array()
     """Length of the play that follows, s. (character,)"""
 
+    gaze_kind: ByteArray = _array(dtype=np.uint8)
+    """What the character looks at: 0 nothing, 1 a point, 2 a character, 3 an object. (character,)"""
+    gaze_index: IntArray = _array(dtype=np.int32, fill=-1)
+    """Character or object that is looked at. (character,)"""
+    gaze_target_world: FloatArray = _array(3)
+    """Point that is looked at now, m. (character, 3)"""
+    gaze_trunk: Float32Array = _array(dtype=np.float32, fill=1)
+    """How far waist and chest take part in the turn, 0 to 1. (character,)"""
+    gaze_weight: Float32Array = _array(dtype=np.float32)
+    """Share of the gaze in the pose, 0 to 1; above 0 until a turn has faded. (character,)"""
+    gaze_weight_rate: Float32Array = _array(dtype=np.float32)
+    """Rate of change of `gaze_weight`, 1/s. (character,)"""
+    gaze_turn: Float32Array = _array(7, 3, dtype=np.float32)
+    """Rotation vectors that gaze adds to the joints from waist to head, rad. (character, 7, 3)"""
+    gaze_turn_rate: Float32Array = _array(7, 3, dtype=np.float32)
+    """Their rates, rad/s. (character, 7, 3)"""
+    gaze_eye_turn: Float32Array = _array(2, 2, dtype=np.float32)
+    """Turn of left and right eye about x (down) and y (left), saccades apart, rad. (character, 2, 2)"""
+    gaze_error: Float32Array = _array(dtype=np.float32)
+    """Angle by which the eyes miss the target, saccades apart, rad. (character,)"""
+    gaze_status: ByteArray = _array(dtype=np.uint8)
+    """0 no target, 1 turning, 2 on target, 3 out of reach of the limits, 4 refused. (character,)"""
+    is_glancing: BoolArray = _array(dtype=np.bool_)
+    """The gaze is an idle glance, which any wanted gaze replaces. (character,)"""
+    glance_character: IntArray = _array(dtype=np.int32, fill=-1)
+    """Who is glanced at, -1 for nobody. (character,)"""
+    glance_until: FloatArray = _array()
+    """Time of the next choice of a glance, s. (character,)"""
+    saccade_mode: ByteArray = _array(dtype=np.uint8)
+    """Attention: 0 listening, 1 talking, 2 thinking, 255 no saccades. (character,)"""
+    saccade_start: Float32Array = _array(2, dtype=np.float32)
+    """Offset from which the eyes jump, about x (down) and y (left), rad. (character, 2)"""
+    saccade_goal: Float32Array = _array(2, dtype=np.float32)
+    """Offset to which they jump; 0 is the target. (character, 2)"""
+    saccade_offset: Float32Array = _array(2, dtype=np.float32)
+    """Where the eyes are beside the target, rad. (character, 2)"""
+    saccade_clock: Float32Array = _array(dtype=np.float32)
+    """Time since the last jump began, s. (character,)"""
+    saccade_duration: Float32Array = _array(dtype=np.float32)
+    """Length of the last jump, s. (character,)"""
+    saccade_until: FloatArray = _array()
+    """Time of the next jump, s. (character,)"""
+
     pose_rotation: Float32Array = _array(4 * PADDED_JOINTS, dtype=np.float32)
     """Local joint rotations, components outermost: w of all joints, then x, y, z. (character, 256)"""
     pose_pelvis: Float32Array = _array(3, dtype=np.float32)

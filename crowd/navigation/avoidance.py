@@ -161,7 +161,8 @@ class Avoidance:
         self.settings = settings
         self.capacity = capacity
         wanted = max(settings.neighbor_count, MOST_EDGES, MOST_PARTNERS)
-        self._steer_cells = CellTable(capacity, 0.25, settings.neighbor_distance)
+        self.steer_cells = CellTable(capacity, 0.25, settings.neighbor_distance)
+        """Characters by cell, as the last `steer` sorted them, for searches up to `neighbor_distance`."""
         self._contact_cells = CellTable(capacity, 0.25, 4.0)
         self._body = np.zeros(BODY_COLUMNS * capacity)
         self._keys = np.zeros((CHUNKS, wanted), np.int64)
@@ -214,7 +215,7 @@ class Avoidance:
         seed, step : int
             Keys of the disturbance that breaks symmetry.
         """
-        cells = self._steer_cells
+        cells = self.steer_cells
         out_velocity_world[active, 0] = 0.0
         out_velocity_world[active, 2] = 0.0
         cells.sort(position_world, radius, active, self.settings.neighbor_distance)
@@ -277,7 +278,7 @@ class Avoidance:
         """
         wanted = count or self.settings.neighbor_count
         reach = distance or self.settings.neighbor_distance
-        cells = self._steer_cells
+        cells = self.steer_cells
         cells.sort(position_world, radius, active, reach)
         found = Neighbors(
             np.zeros((self.capacity, wanted), np.int32),

@@ -1,0 +1,626 @@
+"""Gaze: eyes, head, neck, chest and waist share the turn towards a target, over the pose of other layers."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
+from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.gaze_rows import (
+    AHEAD,
+    CARRY_ROW,
+    ERROR,
+    EXCESS,
+    EYE,
+    EYE_ROW,
+    EYE_SCALE,
+    GOAL,
+    JOINT_ROW,
+    OFFSET,
+    POSITION,
+    RATE,
+    ROTATION,
+    SCALE,
+    SIDE,
+    SUM,
+    TARGET,
+    TRUNK,
+    TURN,
+    WANTED,
+    WEIGHT,
+    WEIGHT_RATE,
+    aim_eye_row,
+    begin_row,
+    excess_row,
+    limit_row,
+    look_back_row,
+    missing_row,
+    settle_row,
+    step_down_row,
+    swing_row,
+    turn_eye_row,
+    turn_frame_row,
+    turn_joint_row,
+)
+from crowd_kernels.lanes import LANES
+from crowd_kernels.polynomial import ONE, ZERO
+from crowd_kernels.pose import child_joint, joint_rotation
+from crowd_kernels.quaternion import from_yaw, rotate
+from crowd_kernels.vector import add
+
+CHUNKS = 32
+
+NOTHING, POINT, CHARACTER, OBJECT = 0, 1, 2, 3
+"""Kinds of targets."""
+IDLE, TURNING, ON_TARGET, OUT_OF_REACH, REFUSED = 0, 1, 2, 3, 4
+"""What has become of a gaze."""
+ON_TARGET_ERROR = np.float32(np.radians(1.0))
+TURNED = 0.1
+"""From this turn on people keep to the side that they have turned to, rad."""
+FADED_WEIGHT, FADED_TURN, RESTING_WEIGHT = 1e-3, 1e-4, 1e-6
+
+
+class GazeArrays(NamedTuple):
+    """The joints from waist to head and both eyes, as the kernel reads them. Angles in rad."""
+
+    joint: npt.NDArray[np.int32]
+    """(K,) Joints of the chain, each the parent of the next, from below the pelvis to the head."""
+    offset: npt.NDArray[np.float32]
+    """(K, 3) Their rest offsets, m."""
+    segment: npt.NDArray[np.int32]
+    """(K,) Columns of the proportions that stretch the offsets."""
+    share: npt.NDArray[np.float32]
+    """(K,) Relative parts in the turn; all equal: equal parts of the whole."""
+    is_trunk: npt.NDArray[np.bool_]
+    """(K,) The joint's part depends on the character's posture."""
+    limit: npt.NDArray[np.float32]
+    """(K, 3) Largest turn about x (pitch), y (heading), z (roll)."""
+    bias: npt.NDArray[np.float32]
+    """(K, 3) Turn that is added: posture, such as a bowed head."""
+    rate: npt.NDArray[np.float32]
+    """(K,) Natural frequency of the joint's motion, 1/s."""
+    eye: npt.NDArray[np.int32]
+    """(2,) Joints of the eyes, children of the head."""
+    eye_offset: npt.NDArray[np.float32]
+    """(2, 3) Their rest offsets, m."""
+    eye_segment: npt.NDArray[np.int32]
+    """(2,) Columns of the proportions."""
+    leg_segment: int
+    """Column that stretches the pelvis position."""
+
+
+class GazeLimits(NamedTuple):
+    """Limits of the eyes, speeds and times. float32."""
+
+    eye_share: Any
+    """Relative part of the eyes in the turn, > 0."""
+    eye_pitch: Any
+    """Largest turn of an eye up or down, rad."""
+    eye_heading: Any
+    """Largest turn of an eye to a side, rad."""
+    eye_speed: Any
+    """Largest speed of an eye against the head, apart from saccades, rad/s."""
+    head_speed: Any
+    """Largest speed of the head by gaze, which all joints share, rad/s."""
+    fade_rate: Any
+    """Natural frequency with which gaze comes and goes, 1/s."""
+
+
+def scratch_length(joint_count: int) -> int:
+    """Number of float32 in one chunk's scratch row for `gaze_crowd` and a chain of `joint_count` joints."""
+    return joint_count * JOINT_ROW + 2 * EYE_ROW + CARRY_ROW + JOINT_ROW
+
+
+@inlined_kernel
+def gather_character(
+    arrays: GazeArrays,
+    segment_scale: Any,
+    position_world: Any,
+    yaw: Any,
+    trunk: float,
+    is_looking: bool,
+    target_world: Any,
+    pose: Any,
+    pelvis: Any,
+    turn: Any,
+    rate: Any,
+    eye_turn: Any,
+    saccade: Any,
+    lane: int,
+    carry: Any,
+    eyes: Any,
+    joints: Any,
+) -> None:
+    """Write what the rows need of one character into its lane.
+
+    Parameters
+    ----------
+    trunk : float
+        Share of the trunk, 0 to 1.
+    is_looking : bool
+        There is a target.
+    lane : int
+        0 to 15.
+    carry, eyes, joints
+        Rows of the block, written in one lane.
+
+    Notes
+    -----
+    All other arguments are the character's rows of those of `gaze_crowd`.
+    """
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    x = target_world[0] - position_world[0]
+    z = target_world[2] - position_world[2]
+    carry[TARGET + lane] = cosine * x - sine * z
+    carry[TARGET + LANES + lane] = target_world[1]
+    carry[TARGET + 2 * LANES + lane] = sine * x + cosine * z
+    leg = segment_scale[arrays.leg_segment]
+    for axis in range(3):
+        carry[POSITION + axis * LANES + lane] = pelvis[axis] * leg
+    for component in range(4):
+        carry[ROTATION + component * LANES + lane] = pose[component * PADDED_JOINTS]
+    carry[GOAL + lane] = ONE if is_looking else ZERO
+    carry[TRUNK + lane] = trunk
+    heading = ZERO
+    for place in range(arrays.joint.shape[0]):
+        first = place * JOINT_ROW + lane
+        for component in range(4):
+            joints[first + ROTATION + component * LANES] = pose[
+                component * PADDED_JOINTS + arrays.joint[place]
+            ]
+        for axis in range(3):
+            joints[first + TURN + axis * LANES] = turn[3 * place + axis]
+            joints[first + RATE + axis * LANES] = rate[3 * place + axis]
+        joints[first + SCALE] = segment_scale[arrays.segment[place]]
+        heading += turn[3 * place + 1]
+    carry[SIDE + lane] = ZERO if abs(heading) < TURNED else (ONE if heading > ZERO else -ONE)
+    for side in range(2):
+        first = side * EYE_ROW + lane
+        for component in range(4):
+            eyes[first + ROTATION + component * LANES] = pose[component * PADDED_JOINTS + arrays.eye[side]]
+        for axis in range(2):
+            eyes[first + TURN + axis * LANES] = eye_turn[2 * side + axis]
+            eyes[first + OFFSET + axis * LANES] = saccade[axis]
+        eyes[first + EYE_SCALE] = segment_scale[arrays.eye_segment[side]]
+
+
+@inlined_kernel
+def scatter_character(
+    arrays: GazeArrays, lane: int, eyes: Any, joints: Any, pose: Any, turn: Any, rate: Any, eye_turn: Any
+) -> float:
+    """Write a lane back to the rows of its character.
+
+    Parameters
+    ----------
+    lane : int
+        0 to 15.
+    eyes, joints
+        Rows of the block.
+
+    Returns
+    -------
+    float
+        Sum of all turns that the gaze holds, rad.
+
+    Notes
+    -----
+    All other arguments are the character's rows of those of `gaze_crowd`.
+    """
+    held = 0.0
+    for place in range(arrays.joint.shape[0]):
+        first = place * JOINT_ROW + lane
+        for component in range(4):
+            pose[component * PADDED_JOINTS + arrays.joint[place]] = joints[
+                first + ROTATION + component * LANES
+            ]
+        for axis in range(3):
+            turn[3 * place + axis] = joints[first + TURN + axis * LANES]
+            rate[3 * place + axis] = joints[first + RATE + axis * LANES]
+            held += abs(turn[3 * place + axis])
+    for side in range(2):
+        first = side * EYE_ROW + lane
+        for component in range(4):
+            pose[component * PADDED_JOINTS + arrays.eye[side]] = eyes[first + ROTATION + component * LANES]
+        for axis in range(2):
+            eye_turn[2 * side + axis] = eyes[first + TURN + axis * LANES]
+            held += abs(eye_turn[2 * side + axis])
+    return held
+
+
+@kernel
+def turn_block(arrays: GazeArrays, limits: GazeLimits, dt: float, carry: Any, eyes: Any, joints: Any) -> None:
+    """Turn the 16 characters of a block.
+
+    Parameters
+    ----------
+    arrays : GazeArrays
+    limits : GazeLimits
+    dt : float
+        s.
+    carry : (CARRY_ROW,) float32
+        In and out.
+    eyes : (2 * EYE_ROW,) float32
+        In and out.
+    joints : ((K + 1) * JOINT_ROW,) float32
+        In and out; the last row is the pelvis.
+
+    Notes
+    -----
+    **Source:** the chain of Thiebaux, Lance, Marsella, "Real-time expressive gaze animation for virtual
+    humans", 2009.
+    """
+    count = arrays.joint.shape[0]
+    step = np.float32(dt)
+    head = joints[(count - 1) * JOINT_ROW : count * JOINT_ROW]
+    pelvis = joints[count * JOINT_ROW :]
+    eye_x = np.float32(0.5) * (arrays.eye_offset[0, 0] + arrays.eye_offset[1, 0])
+    eye_y = np.float32(0.5) * (arrays.eye_offset[0, 1] + arrays.eye_offset[1, 1])
+    eye_z = np.float32(0.5) * (arrays.eye_offset[0, 2] + arrays.eye_offset[1, 2])
+    for lane in range(LANES):
+        head[AHEAD + lane] = ZERO
+        head[AHEAD + LANES + lane] = ZERO
+        head[AHEAD + 2 * LANES + lane] = ONE
+        head[EYE + lane] = eye_x * eyes[EYE_SCALE + lane]
+        head[EYE + LANES + lane] = eye_y * eyes[EYE_SCALE + lane]
+        head[EYE + 2 * LANES + lane] = eye_z * eyes[EYE_SCALE + lane]
+        carry[SUM + lane] = limits.eye_share
+    for place in range(count - 1, -1, -1):
+        above = joints[(place - 1) * JOINT_ROW : place * JOINT_ROW] if place > 0 else pelvis
+        look_back_row(
+            joints[place * JOINT_ROW : (place + 1) * JOINT_ROW],
+            carry,
+            arrays.offset[place, 0],
+            arrays.offset[place, 1],
+            arrays.offset[place, 2],
+            arrays.share[place],
+            arrays.is_trunk[place],
+            above,
+        )
+    decay = np.float32(math.exp(-limits.fade_rate * dt))
+    begin_row(pelvis, carry, limits.fade_rate, decay, step)
+    # The pelvis as it is, to which the second walk along the chain returns.
+    for component in range(7 * LANES):
+        pelvis[component] = carry[component]
+    for place in range(count):
+        row = joints[place * JOINT_ROW : (place + 1) * JOINT_ROW]
+        step_down_row(row, carry, arrays.offset[place, 0], arrays.offset[place, 1], arrays.offset[place, 2])
+        missing_row(row, carry)
+        limit_row(
+            row,
+            carry,
+            arrays.limit[place, 0],
+            arrays.limit[place, 1],
+            arrays.limit[place, 2],
+            arrays.bias[place, 0],
+            arrays.bias[place, 1],
+            arrays.bias[place, 2],
+        )
+        turn_frame_row(row, WANTED, carry)
+    excess_row(eye_x, eye_y, eye_z, eyes, limits.eye_pitch, limits.eye_heading, carry)
+    for place in range(count):
+        decay = np.float32(math.exp(-arrays.rate[place] * dt))
+        swing_row(joints[place * JOINT_ROW : (place + 1) * JOINT_ROW], carry, arrays.rate[place], decay, step)
+    for component in range(7 * LANES):
+        carry[component] = pelvis[component]
+    for place in range(count):
+        row = joints[place * JOINT_ROW : (place + 1) * JOINT_ROW]
+        settle_row(row, carry, limits.head_speed)
+        step_down_row(row, carry, arrays.offset[place, 0], arrays.offset[place, 1], arrays.offset[place, 2])
+        turn_frame_row(row, TURN, carry)
+        turn_joint_row(row)
+    for side in range(2):
+        eye = eyes[side * EYE_ROW : (side + 1) * EYE_ROW]
+        aim_eye_row(
+            eye,
+            carry,
+            arrays.eye_offset[side, 0],
+            arrays.eye_offset[side, 1],
+            arrays.eye_offset[side, 2],
+            limits.eye_pitch,
+            limits.eye_heading,
+            limits.eye_speed * step,
+        )
+        turn_eye_row(eye, limits.eye_pitch, limits.eye_heading)
+
+
+@kernel
+def gaze_chunk(
+    arrays: GazeArrays,
+    limits: GazeLimits,
+    segment_scale: Any,
+    position_world: Any,
+    yaw: Any,
+    trunk: Any,
+    kind: Any,
+    target_world: Any,
+    saccade: Any,
+    active: Any,
+    dt: float,
+    begin: int,
+    end: int,
+    scratch: Any,
+    pose_rotation: Any,
+    pose_pelvis: Any,
+    turn: Any,
+    turn_rate: Any,
+    eye_turn: Any,
+    weight: Any,
+    weight_rate: Any,
+    out_error: Any,
+    out_status: Any,
+) -> None:
+    """Turn one run of blocks of 16 active characters.
+
+    Parameters
+    ----------
+    begin, end : int
+        Range of blocks.
+    scratch : (scratch_length(K),) float32
+        Row of this chunk.
+
+    Notes
+    -----
+    All other arguments are those of `gaze_crowd`.
+    """
+    count = active.shape[0]
+    carry = scratch[:CARRY_ROW]
+    eyes = scratch[CARRY_ROW : CARRY_ROW + 2 * EYE_ROW]
+    joints = scratch[CARRY_ROW + 2 * EYE_ROW :]
+    for block in range(begin, end):
+        first = block * LANES
+        for lane in range(LANES):
+            character = active[min(first + lane, count - 1)]
+            gather_character(
+                arrays,
+                segment_scale[character],
+                position_world[character],
+                yaw[character],
+                trunk[character],
+                kind[character] != NOTHING,
+                target_world[character],
+                pose_rotation[character],
+                pose_pelvis[character],
+                turn[character],
+                turn_rate[character],
+                eye_turn[character],
+                saccade[character],
+                lane,
+                carry,
+                eyes,
+                joints,
+            )
+            carry[WEIGHT + lane] = weight[character]
+            carry[WEIGHT_RATE + lane] = weight_rate[character]
+        turn_block(arrays, limits, dt, carry, eyes, joints)
+        for lane in range(min(LANES, count - first)):
+            character = active[first + lane]
+            held = scatter_character(
+                arrays,
+                lane,
+                eyes,
+                joints,
+                pose_rotation[character],
+                turn[character],
+                turn_rate[character],
+                eye_turn[character],
+            )
+            weight[character] = carry[WEIGHT + lane]
+            weight_rate[character] = carry[WEIGHT_RATE + lane]
+            error = max(eyes[ERROR + lane], eyes[EYE_ROW + ERROR + lane])
+            out_error[character] = error if carry[GOAL + lane] > ZERO else ZERO
+            if kind[character] == NOTHING:
+                out_status[character] = IDLE
+                if weight[character] < FADED_WEIGHT and held < FADED_TURN:
+                    weight[character] = ZERO
+                    weight_rate[character] = ZERO
+                    turn[character, :] = ZERO
+                    turn_rate[character, :] = ZERO
+                    eye_turn[character, :] = ZERO
+                else:
+                    weight[character] = max(weight[character], RESTING_WEIGHT)
+            elif carry[GOAL + lane] < ZERO:
+                out_status[character] = REFUSED
+            elif error <= ON_TARGET_ERROR:
+                out_status[character] = ON_TARGET
+            elif carry[EXCESS + lane] > ONE:
+                out_status[character] = OUT_OF_REACH
+            else:
+                out_status[character] = TURNING
+
+
+@parallel_kernel
+def gaze_crowd(
+    arrays: GazeArrays,
+    limits: GazeLimits,
+    segment_scale: Any,
+    position_world: Any,
+    yaw: Any,
+    trunk: Any,
+    kind: Any,
+    target_world: Any,
+    saccade: Any,
+    active: Any,
+    dt: float,
+    scratch: Any,
+    pose_rotation: Any,
+    pose_pelvis: Any,
+    turn: Any,
+    turn_rate: Any,
+    eye_turn: Any,
+    weight: Any,
+    weight_rate: Any,
+    out_error: Any,
+    out_status: Any,
+) -> None:
+    """Turn trunk, neck, head and eyes towards targets.
+
+    Parameters
+    ----------
+    arrays : GazeArrays
+    limits : GazeLimits
+    segment_scale : (N, G) float32
+        Proportions.
+    position_world : (N, 3) float64
+        Root, m.
+    yaw : (N,) float64
+        Heading, rad.
+    trunk : (N,) float32
+        Share of the trunk that takes part, 0 to 1.
+    kind : (N,) uint8
+        0: look at nothing, any turn that is left fades; else there is a target.
+    target_world : (N, 3) float64
+        Target, m; refused where it is not finite, within 0.1 m of the eyes, or 1,000 km away.
+    saccade : (N, 2) float32
+        Added to the turn of both eyes about x and y, within their limits, rad.
+    active : (A,) int32
+        Characters to process, each once; 0 to N - 1.
+    dt : float
+        s.
+    scratch : (32, scratch_length(K)) float32
+        One row for each chunk.
+    pose_rotation : (N, 256) float32
+        In and out: joints of the chain and eyes are turned.
+    pose_pelvis : (N, 3) float32
+        Pelvis in the root frame at leg scale 1, m; not changed.
+    turn, turn_rate : (N, 3 K) float32
+        In and out: rotation vector that gaze adds to each joint, in the joint's frame, and its rate; rad,
+        rad/s.
+    eye_turn : (N, 4) float32
+        In and out: turn about x and y of the left and the right eye, rad.
+    weight, weight_rate : (N,) float32
+        In and out: share of the gaze in the body's pose, 0 to 1, and its rate, 1/s; 0 once all turns have
+        faded.
+    out_error : (N,) float32
+        Largest angle between an eye's ray without saccade and its target, rad; 0 without one.
+    out_status : (N,) uint8
+        0 no target, 1 turning, 2 on target (both rays within 1 degree), 3 out of reach of all limits
+        together, 4 refused.
+
+    Notes
+    -----
+    **Source:** Feng, Xu, Shapiro, section 6; Thiebaux, Lance, Marsella, "Real-time expressive gaze animation
+    for virtual humans", 2009: shares of what is missing, limits, bias, speeds.
+    **Differs from the source:** joints swing as critically damped springs instead of exponential smoothing,
+    which would start with a jump in speed; heads stay level; eyes are aimed exactly after the body has
+    turned.
+    """
+    block_count = (active.shape[0] + LANES - 1) // LANES
+    for k in prange(CHUNKS):
+        chunk = (k * 37) % CHUNKS
+        gaze_chunk(
+            arrays,
+            limits,
+            segment_scale,
+            position_world,
+            yaw,
+            trunk,
+            kind,
+            target_world,
+            saccade,
+            active,
+            dt,
+            chunk * block_count // CHUNKS,
+            (chunk + 1) * block_count // CHUNKS,
+            scratch[chunk],
+            pose_rotation,
+            pose_pelvis,
+            turn,
+            turn_rate,
+            eye_turn,
+            weight,
+            weight_rate,
+            out_error,
+            out_status,
+        )
+
+
+@inlined_kernel
+def eyes_of(
+    arrays: GazeArrays, scale: Any, place: Any, yaw: float, pose: Any, pelvis: Any
+) -> tuple[float, float, float]:
+    """Find the point between the eyes of one character, m; arguments are its rows of `eye_point_crowd`."""
+    leg = float(scale[arrays.leg_segment])
+    position = (float(pelvis[0]) * leg, float(pelvis[1]) * leg, float(pelvis[2]) * leg)
+    rotation = joint_rotation(pose, 0)
+    for k in range(arrays.joint.shape[0]):
+        size = float(scale[arrays.segment[k]])
+        offset = (
+            arrays.offset[k, 0] * size,
+            arrays.offset[k, 1] * size,
+            arrays.offset[k, 2] * size,
+        )
+        rotation, position = child_joint(rotation, position, offset, joint_rotation(pose, arrays.joint[k]))
+    size = 0.5 * float(scale[arrays.eye_segment[0]])
+    between = (
+        (arrays.eye_offset[0, 0] + arrays.eye_offset[1, 0]) * size,
+        (arrays.eye_offset[0, 1] + arrays.eye_offset[1, 1]) * size,
+        (arrays.eye_offset[0, 2] + arrays.eye_offset[1, 2]) * size,
+    )
+    eyes = rotate(from_yaw(yaw), add(position, rotate(rotation, between)))
+    return eyes[0] + place[0], eyes[1] + place[1], eyes[2] + place[2]
+
+
+@parallel_kernel
+def eye_point_crowd(
+    arrays: GazeArrays,
+    segment_scale: Any,
+    position_world: Any,
+    yaw: Any,
+    pose_rotation: Any,
+    pose_pelvis: Any,
+    is_active: Any,
+    index: Any,
+    active: Any,
+    out_target_world: Any,
+) -> None:
+    """Aim characters at the eyes of other characters.
+
+    Parameters
+    ----------
+    arrays : GazeArrays
+    segment_scale : (N, G) float32
+        Proportions.
+    position_world : (N, 3) float64
+        Root, m.
+    yaw : (N,) float64
+        Heading, rad.
+    pose_rotation : (N, 256) float32
+        Pose rows, before anybody's gaze.
+    pose_pelvis : (N, 3) float32
+        Pelvis in the root frame at leg scale 1, m.
+    is_active : (N,) bool
+        The row holds somebody who can be looked at.
+    index : (N,) int32
+        Who is looked at.
+    active : (A,) int32
+        Characters who look at others, each once; 0 to N - 1.
+    out_target_world : (N, 3) float64
+        Written in rows of `active`: point between the eyes, m; NaN where nobody is there or it is oneself.
+
+    Notes
+    -----
+    **Source:** forward kinematics of the chain from pelvis to head.
+    """
+    count = active.shape[0]
+    for k in prange(CHUNKS):
+        chunk = (k * 37) % CHUNKS
+        for place in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            character = active[place]
+            other = index[character]
+            is_there = 0 <= other < is_active.shape[0] and other != character
+            if is_there and is_active[other]:
+                x, y, z = eyes_of(
+                    arrays,
+                    segment_scale[other],
+                    position_world[other],
+                    yaw[other],
+                    pose_rotation[other],
+                    pose_pelvis[other],
+                )
+            else:
+                x, y, z = math.nan, math.nan, math.nan
+            out_target_world[character, 0] = x
+            out_target_world[character, 1] = y
+            out_target_world[character, 2] = z
