@@ -1,4 +1,4 @@
-"""Gaze of everybody at once, saccades and glances; answers are checked by the eyes' rays and by statistics."""
+"""Gaze of everybody at once, saccades and glances; answers are checked by the eyes' rays and statistics."""
 
 import math
 from dataclasses import dataclass, field
@@ -116,7 +116,7 @@ def rays_miss(data: Onlookers) -> npt.NDArray[np.float64]:
         return np.asarray(v + a[:, :1] * t + np.cross(a[:, 1:], t))
 
     rotation = rows[:, :, 0]
-    place = state.pose_pelvis * data.scale[:, arrays.leg_segment, None].astype(np.float64)
+    place = state.pose_pelvis.astype(np.float64) * data.scale[:, arrays.leg_segment, None]
     chain = list(zip(arrays.joint, arrays.offset, arrays.segment, strict=True))
     for joint, offset, segment in chain:
         place = place + rotated(rotation, offset * data.scale[:, segment, None].astype(np.float64))

@@ -137,7 +137,7 @@ class Commands:
         point_world: npt.ArrayLike | None = None,
         *,
         character: npt.ArrayLike | None = None,
-        object: npt.ArrayLike | None = None,
+        object: str | npt.ArrayLike | None = None,
         trunk: float = 1.0,
     ) -> None:
         """Let characters look at a point, another character or an object, until `look_away`.
@@ -151,8 +151,8 @@ class Commands:
             One for all or one each, m.
         character : int or (M,) int, optional
             Whom to look at instead.
-        object : int or (M,) int, optional
-            Which object to look at instead.
+        object : str, int or (M,) int, optional
+            Name or row of an object to look at instead.
         trunk : float
             How far waist and chest take part, 0 to 1.
 
@@ -188,7 +188,12 @@ class Commands:
             gaze.look_at_character(state, rows, others if others.size > 1 else others[0], trunk)
         else:
             assert object is not None
-            gaze.look_at_object(state, rows, object, trunk)
+            objects = self._simulation.model.objects
+            index = np.asarray(objects.index(object) if isinstance(object, str) else object)
+            if ((index < 0) | (index >= objects.count)).any():
+                known = f"0 to {objects.count - 1}" if objects.count else "the scenario has no objects"
+                raise SettingsError(describe("look_at", "no such object", index.tolist(), known))
+            gaze.look_at_object(state, rows, index, trunk)
 
     def look_away(self, characters: Characters) -> None:
         """Let the gaze of characters fade; idle glances may come again."""

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ from crowd.navigation.avoidance import Avoidance
 from crowd.navigation.cell_table import CellTable
 from crowd.people import People
 from crowd.state import Float32Array, FloatArray, IntArray, State
+from crowd.world.objects import ObjectState
 from crowd_kernels.gaze import (
     CHARACTER,
     CHUNKS,
@@ -137,13 +138,6 @@ class GazeSettings:
     saccades: tuple[SaccadeSettings, ...] = SACCADES
 
 
-class Placed(Protocol):
-    """Whatever has places that can be looked at."""
-
-    position_world: FloatArray
-    """m. (M, 3)"""
-
-
 class Gaze:
     """Turns eyes, head, neck, chest and waist towards what people look at."""
 
@@ -176,9 +170,10 @@ class Gaze:
         skeleton: Skeleton,
         capacity: int,
         avoidance: Avoidance | None = None,
+        objects: ObjectState | None = None,
         settings: GazeSettings | None = None,
     ) -> None:
-        """Prepare for a skeleton; neighbours come from `avoidance`, and without it nobody glances."""
+        """Prepare for a skeleton; neighbours come from `avoidance`, without which nobody glances."""
         self.settings = settings or GazeSettings()
         self.arrays = gaze_arrays(skeleton, self.settings)
         self.limits = gaze_limits(self.settings)
@@ -187,8 +182,7 @@ class Gaze:
         if avoidance is not None:
             seen = min(self.glance_limits.distance, avoidance.settings.neighbor_distance)
             self.glance_limits = self.glance_limits._replace(distance=seen)
-        self.objects: Placed | None = None
-        """Objects that `look_at_object` means."""
+        self._objects = objects
         self.may_glance: npt.NDArray[np.bool_] = np.full(capacity, self.settings.glances.is_on)
         """Who glances at others when nothing else is looked at. (character,)"""
         self._cells = None if avoidance is None else avoidance.steer_cells
@@ -381,9 +375,9 @@ class Gaze:
     def _object_points(self, index: IntArray) -> FloatArray:
         """Where objects are; NaN for those that do not exist."""
         points = np.full((index.size, 3), np.nan)
-        if self.objects is not None:
-            exists = (index >= 0) & (index < len(self.objects.position_world))
-            points[exists] = self.objects.position_world[index[exists]]
+        if self._objects is not None:
+            exists = (index >= 0) & (index < self._objects.count)
+            points[exists] = self._objects.position_world[index[exists]]
         return points
 
 

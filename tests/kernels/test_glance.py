@@ -30,8 +30,8 @@ class Square:
         cells.sort(self.position, np.full(len(self.yaw), 0.25), active, LIMITS.distance)
         glance_crowd(
             cells.cell_start, cells.point, cells.character, cells.columns, cells.rows, cells.cell_size,
-            limits, self.position, self.velocity, self.yaw, self.is_active, active, seed, self.index, self.index * dt,
-            self.keys, self.until, self.whom,
+            limits, self.position, self.velocity, self.yaw, self.is_active, active, seed, self.index,
+            self.index * dt, self.keys, self.until, self.whom,
         )  # fmt: skip
 
 

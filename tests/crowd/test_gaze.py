@@ -1,0 +1,150 @@
+"""People who look at points, at each other and at objects, in whole runs."""
+
+import numpy as np
+import pytest
+
+import crowd
+from crowd.controllers.gaze import Gaze, GazeSettings, GlanceSettings
+from crowd.errors import SettingsError
+from crowd.scenario.schema import Area, Character, Goal, Region, Scenario, WorldTable
+from crowd_kernels.gaze import ON_TARGET, REFUSED
+
+GROUND = WorldTable(bounds=Area(x=(-20, 20), z=(-20, 20)))
+
+
+def eye_misses(simulation, character, target):
+    """Angles between the rays of both eyes as drawn and a target, degrees."""
+    skeleton, joints, state = simulation.model.skeleton, simulation.joints, simulation.state
+    places, misses = simulation.joint_positions_world(), []
+    for name in ("left_eye", "right_eye"):
+        joint = skeleton.joint(name)
+        w, x, y, z = joints.rotation_model[character, joint].astype(float)
+        ray = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+        sine, cosine = np.sin(state.yaw[character]), np.cos(state.yaw[character])
+        ray = np.array([cosine * ray[0] + sine * ray[2], ray[1], cosine * ray[2] - sine * ray[0]])
+        way = target - places[character, joint]
+        misses.append(np.degrees(np.arccos(min(ray @ way / np.linalg.norm(way) / np.linalg.norm(ray), 1.0))))
+    return misses
+
+
+def pair(**options):
+    """Somebody who stands, and somebody who walks past in front."""
+    people = (
+        Character(position=(0, 0), facing=0),
+        Character(position=(-3, 3), facing=90, goals=(Goal(position=(4, 3)),)),
+    )
+    return crowd.Simulation(Scenario(world=GROUND, characters=people), seed=4, **options)
+
+
+def test_eyes_as_drawn_meet_a_point_also_while_walking():
+    simulation = pair()
+    target = np.array([2.0, 0.8, 5.0])
+    simulation.gaze.set_mode(simulation.state, np.array([0, 1], np.int32), None)
+    simulation.commands.look_at([0, 1], target)
+    for frame in simulation.run(seconds=2.5):
+        if frame.time > 1.2:
+            # The foot locks lower the pelvis a little after the gaze.
+            assert max(eye_misses(simulation, 0, target)) < 1.0
+            assert max(eye_misses(simulation, 1, target)) < 1.0
+    assert simulation.state.gaze_status.tolist() == [ON_TARGET, ON_TARGET]
+    simulation.commands.look_away([0, 1])
+    for _ in simulation.run(seconds=2.5):
+        pass
+    assert not simulation.state.gaze_turn[simulation.state.gaze_kind == 0].any()
+
+
+def test_the_eyes_of_somebody_who_walks_past_are_followed():
+    simulation = pair()
+    simulation.gaze.set_mode(simulation.state, np.array([0], np.int32), None)
+    simulation.commands.look_at(0, character=1)
+    skeleton = simulation.model.skeleton
+    eyes = [skeleton.joint("left_eye"), skeleton.joint("right_eye")]
+    for frame in simulation.run(seconds=4.0):
+        if frame.time > 1.0:
+            target = simulation.joint_positions_world()[1, eyes].mean(axis=0)
+            assert max(eye_misses(simulation, 0, target)) < 1.0
+    assert simulation.state.gaze_status[0] == ON_TARGET
+
+
+def test_what_cannot_be_looked_at_is_refused_by_a_status():
+    simulation = pair()
+    simulation.commands.look_at(0, (np.nan, 1, 1))
+    simulation.commands.look_at(1, character=1)
+    for _ in simulation.run(seconds=0.5):
+        pass
+    assert simulation.state.gaze_status.tolist() == [REFUSED, REFUSED]
+    assert np.isfinite(simulation.joint_positions_world()).all()
+    assert not np.isnan(simulation.state.gaze_turn).any()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda c: c.look_at(0), "exactly one target"),
+        (lambda c: c.look_at(0, (0, 1, 2), character=1), "point and character"),
+        (lambda c: c.look_at(0, (0, 1)), "shape"),
+        (lambda c: c.look_at(0, character=9), "no such row"),
+        (lambda c: c.look_at(0, object=0), "no objects"),
+        (lambda c: c.look_at(0, object="cup"), "no object has this name"),
+        (lambda c: c.look_at(0, (0, 1, 2), trunk=2), "0 to 1"),
+    ],
+)
+def test_bad_commands_get_one_clear_line(call, message):
+    with pytest.raises(SettingsError, match=message) as caught:
+        call(pair().commands)
+    assert "\n" not in str(caught.value)
+
+
+def square(count=60):
+    area = Area(x=(-7, 7), z=(-7, 7))
+    return Scenario(
+        world=GROUND,
+        regions=(Region(count=count, area=area, goals=(Goal(area=area, radius=0.6),), repeat=True),),
+    )
+
+
+def test_people_glance_at_each_other_now_and_then_and_only_forwards():
+    simulation = crowd.Simulation(square(), seed=2)
+    state, glances, seen = simulation.state, [], set()
+    for _ in simulation.run(seconds=12.0):
+        glances.append(state.is_glancing.mean())
+        for character in np.flatnonzero(state.is_glancing):
+            seen.add((character, int(state.gaze_index[character])))
+    assert 0.05 < np.mean(glances) < 0.5
+    assert len(seen) > 60
+    assert (state.gaze_kind[state.is_glancing] == 2).all()
+
+
+def test_a_wanted_gaze_replaces_a_glance_and_is_not_replaced():
+    simulation = crowd.Simulation(square(), seed=2)
+    for _ in simulation.run(seconds=5.0):
+        pass
+    simulation.commands.look_at(slice(None), (0.0, 1.5, 0.0))
+    for _ in simulation.run(seconds=5.0):
+        assert not simulation.state.is_glancing.any()
+        assert (simulation.state.gaze_kind == 1).all()
+
+
+def test_looking_changes_neither_ways_nor_other_choices():
+    runs = []
+    for is_on in (True, False):
+        simulation = crowd.Simulation(square(), seed=2)
+        simulation.gaze.may_glance[:] = is_on
+        for _ in simulation.run(seconds=4.0):
+            pass
+        runs.append(simulation)
+    for field in ("position_world", "yaw", "phase", "idle_clip", "idle_until", "foot_point_world"):
+        one, other = (getattr(run.state, field) for run in runs)
+        np.testing.assert_allclose(one, other, atol=0 if field != "foot_point_world" else 1e-12)
+    assert (runs[0].state.pose_rotation != runs[1].state.pose_rotation).any()
+
+
+def test_glances_can_be_switched_off_by_settings():
+    simulation = crowd.Simulation(square(), seed=2)
+    quiet = GazeSettings(glances=GlanceSettings(is_on=False))
+    gaze = Gaze(
+        simulation.model.skeleton, simulation.state.capacity, simulation.navigator.avoidance, settings=quiet
+    )
+    simulation.controllers = (*simulation.controllers[:-1], gaze)
+    for _ in simulation.run(seconds=5.0):
+        assert not simulation.state.is_glancing.any()
