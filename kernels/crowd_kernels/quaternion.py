@@ -35,9 +35,13 @@ def conjugate(q: Quaternion) -> Quaternion:
 @kernel
 def rotate(q: Quaternion, v: Vector) -> Vector:
     """Rotate a vector."""
-    tx = 2.0 * (q[2] * v[2] - q[3] * v[1])
-    ty = 2.0 * (q[3] * v[0] - q[1] * v[2])
-    tz = 2.0 * (q[1] * v[1] - q[2] * v[0])
+    tx = q[2] * v[2] - q[3] * v[1]
+    ty = q[3] * v[0] - q[1] * v[2]
+    tz = q[1] * v[1] - q[2] * v[0]
+    # Doubled by sums, which keep the precision of the arguments.
+    tx += tx
+    ty += ty
+    tz += tz
     return (
         v[0] + q[0] * tx + q[2] * tz - q[3] * ty,
         v[1] + q[0] * ty + q[3] * tx - q[1] * tz,
