@@ -23,7 +23,7 @@ from crowd_kernels.ik import (
 Array = npt.NDArray[Any]
 
 SIZES = (1000, 10_000)
-ITERATIONS = 10
+ITERATIONS = 20
 OFFSET = [
     *([0.0, 0.1, 0.0] for _ in range(7)),
     [0.0, -0.01, 0.17],
