@@ -15,6 +15,7 @@ from crowd.characters import MeshPart
 from crowd.export.bodies import Bodies, Body
 from crowd.export.output import whole_folder
 from crowd.export.selection import Selection, Visit
+from crowd.motion.rotation import conjugate, multiply
 
 AnyArray = npt.NDArray[Any]
 
@@ -127,7 +128,7 @@ def write_person(selection: Selection, visit: Visit, body: Body, path: Path) -> 
     content["animations"] = [{"name": visit.name, "samplers": samplers, "channels": channels}]
     first = recording.poses(slice(visit.first, visit.first + 1), slots)
     start = body.tracks(recording, first, visit.slot)
-    content["nodes"] = _nodes(body, visit.name, start.scale, start.rotation[0], start.translation[0])
+    content["nodes"] = _nodes(body, visit.name, start.scale, start.translation[0])
     content |= {
         "accessors": layout.accessors,
         "bufferViews": layout.views,
@@ -171,10 +172,12 @@ def _header(content: dict[str, Any], size: int) -> bytes:
     )
 
 
-def _nodes(
-    body: Body, name: str, scale: float, rotation: AnyArray, translation: AnyArray
-) -> list[dict[str, Any]]:
-    """The person's node, its joints in the pose of the first frame, and its meshes."""
+def _nodes(body: Body, name: str, scale: float, translation: AnyArray) -> list[dict[str, Any]]:
+    """The person's node, its joints in rest pose where the person comes in, and its meshes."""
+    rotation = body.rest_rotation.copy()
+    for joint, parent in enumerate(body.parent):
+        if parent >= 0:
+            rotation[joint] = multiply(conjugate(body.rest_rotation[parent]), body.rest_rotation[joint])
     joints = len(body.joint_names)
     roots = [joint + 1 for joint, parent in enumerate(body.parent) if parent < 0]
     meshes = list(range(joints + 1, joints + 1 + len(body.parts)))

@@ -19,9 +19,13 @@ from crowd.export import selection as selections
 from crowd.export.bvh import euler_zyx
 from crowd.export.coco import EDGES, KEYPOINTS, PictureCamera
 from crowd.export.formats import ExportSettings
+from crowd.motion.body import build_skeleton
+from crowd.motion.clip import ClipKind
 from crowd.motion.formats import read_motions
 from crowd.motion.formats.euler import compose
-from crowd.motion.rotation import conjugate, from_vector, multiply, to_vector
+from crowd.motion.importing.importer import import_clip
+from crowd.motion.importing.labels import Correction
+from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, to_vector
 from crowd.recording import Recorder, Recording
 
 pytestmark = pytest.mark.xdist_group("export")
@@ -79,6 +83,29 @@ def test_a_person_comes_back_the_same(plaza, tmp_path, format_name):
         expected_rotation, expected_position = truth(plaza, visit.slot, visit.first, visit.last)
         assert np.abs(position[:, place] - expected_position).max() < MOST_WAY
         assert turn_between(rotation[:, place], expected_rotation) < MOST_TURN
+
+
+@pytest.mark.parametrize("format_name", ["bvh", "gltf"])
+def test_an_exported_person_is_imported_the_same(plaza, tmp_path, format_name):
+    skeleton = build_skeleton()
+    selection = Selection(plaza)
+    export(selection, format_name, tmp_path / "people")
+    files = sorted((tmp_path / "people").iterdir())
+    for visit, file in zip(selection.visits, files, strict=True):
+        (motion,) = read_motions(file)
+        entry = import_clip(motion, skeleton, correction=Correction(kind=ClipKind.OTHER))
+        clip, slots = entry.clip, np.array([visit.slot])
+        poses = plaza.poses(slice(visit.first, visit.last + 1), slots)
+        assert turn_between(clip.rotation_local[:, 1:].astype(float), poses.rotation[:, 0, 1:]) < MOST_TURN
+        # The clip starts at the origin, ahead; the person is put there too.
+        heading = about(1, clip.root_yaw)
+        rotation = multiply(heading, clip.rotation_local[:, 0].astype(float))
+        pelvis = clip.root_position + rotate(heading, clip.pelvis_position_root.astype(float))
+        back = multiply(rotation[0], conjugate(poses.rotation[0, 0, 0]))
+        assert turn_between(rotation, multiply(back, poses.rotation[:, 0, 0])) < MOST_TURN
+        way = entry.scale * rotate(back, poses.pelvis_world[:, 0] - poses.pelvis_world[:1, 0])
+        assert np.abs(pelvis - pelvis[0] - way).max() < MOST_WAY
+        assert pelvis[0, 1] == pytest.approx(entry.scale * poses.pelvis_world[0, 0, 1], abs=MOST_WAY)
 
 
 def test_a_crowd_in_usd_has_the_same_joints(plaza, tmp_path):

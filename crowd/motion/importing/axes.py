@@ -28,6 +28,8 @@ USUAL_LEG = 0.86
 """Hip to ankle of a grown person, m (Drillis and Contini 1966 at 1.75 m)."""
 LEG_RANGE = (0.25, 1.6)
 """Leg lengths that are believed, m; toys and giants need ``--units``."""
+STEADY = 1e-3
+"""A joint whose place in its parent changes by less than this share of the longest bone does not move."""
 AXIS_NAMES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -139,9 +141,17 @@ def unit_of(motion: SourceMotion, leg: float, units: str | None) -> tuple[float,
 
 
 def rest_positions(motion: SourceMotion) -> FloatArray:
-    """Joint positions (J, 3) of the rest pose, file units and axes."""
+    """Joint positions (J, 3) of the rest pose, file units and axes, in the proportions of the motion.
+
+    Some files animate one skeleton in several sizes: what a motion keeps constant counts, not the rest pose.
+    """
     skeleton = motion.skeleton
-    return world_pose(skeleton.parent, skeleton.rest_rotation, skeleton.offset)[1]
+    offset = skeleton.offset.copy()
+    low, high = motion.position_local.min(axis=0), motion.position_local.max(axis=0)
+    size = float(np.linalg.norm(offset[1:], axis=1).max(initial=0.0))
+    is_constant = (skeleton.parent >= 0) & ((high - low).max(axis=1) < STEADY * size)
+    offset[is_constant] = 0.5 * (low + high)[is_constant]
+    return world_pose(skeleton.parent, skeleton.rest_rotation, offset)[1]
 
 
 def _leg_length(motion: SourceMotion, joints: JointMap) -> float:
@@ -184,7 +194,8 @@ def axis_named(name: str) -> FloatArray:
 def convert(motion: SourceMotion, convention: Convention) -> PosedSource:
     """Pose a source motion in metres and our axes."""
     skeleton = motion.skeleton
-    rest_rotation, rest = world_pose(skeleton.parent, skeleton.rest_rotation, skeleton.offset)
+    rest_rotation, _ = world_pose(skeleton.parent, skeleton.rest_rotation, skeleton.offset)
+    rest = rest_positions(motion)
     rotation, position = motion.world()
     scale, turn = convention.metres_per_unit, convention.to_ours
     turned = multiply(multiply(turn, multiply(rotation, conjugate(rest_rotation))), conjugate(turn))

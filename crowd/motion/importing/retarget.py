@@ -27,6 +27,8 @@ TOE_LENGTH = 0.05
 """Tip of the toes before the ball, m."""
 SOLE_BELOW_JOINTS = 0.015
 """Sole below the lowest joint of a foot, m."""
+PARALLEL = 1e-3
+"""Bones of one skeleton in several proportions differ in direction by less, rad."""
 LIMBS = {
     "upper_arm": "forearm",
     "forearm": "hand",
@@ -98,22 +100,49 @@ def retarget(
     -----
     Rotations are carried over in world space against both rest poses; limb segments are first aimed like the
     source's in its rest pose, so that a T-pose and hanging arms agree. Feet then stay where the source's are
-    (times the ratio of leg lengths), soles as high over the ground, and the legs bend to meet them.
+    (times the ratio of leg lengths), soles as high over the ground, and the legs bend to meet them. Motion of
+    the project's own skeleton, such as an exported recording, is taken as it is.
     """
     scale = leg_scale(source, joints)
     rotation = world_rotations(source, joints, skeleton)
+    travel = scale * source.position[:, joints.joint["pelvis"]]
+    if is_ours(source, joints, skeleton):
+        return Retargeted(continuous(local_of(rotation, skeleton)), travel, travel, source.frame_rate, scale)
     level_feet(rotation, skeleton, is_flat)
     pelvis = place_pelvis(source, joints, skeleton, rotation, scale, ground)
     ankles = place_ankles(source, joints, skeleton, rotation, scale, ground, soles)
     pelvis = within_reach(pelvis, rotation, skeleton, ankles)
     for side, ankle in zip(("right", "left"), ankles, strict=True):
         bend_leg(rotation, skeleton, side, pelvis, ankle)
+    return Retargeted(continuous(local_of(rotation, skeleton)), pelvis, travel, source.frame_rate, scale)
+
+
+def local_of(rotation: FloatArray, skeleton: Skeleton) -> FloatArray:
+    """Rotations (F, J, 4) against the parent of ones against the world."""
     local = rotation.copy()
     for joint, parent in enumerate(skeleton.parent):
         if parent >= 0:
             local[:, joint] = multiply(conjugate(rotation[:, parent]), rotation[:, joint])
-    travel = scale * source.position[:, joints.joint["pelvis"]]
-    return Retargeted(continuous(local), pelvis, travel, source.frame_rate, scale)
+    return local
+
+
+def is_ours(source: PosedSource, joints: JointMap, skeleton: Skeleton) -> bool:
+    """Whether a source has the project's own skeleton, in any proportions: such motion is taken as it is."""
+    place: dict[str, int] = dict(joints.joint)
+    for chain, found in joints.chain.items():
+        place |= {f"{chain}_{number}": joint for number, joint in enumerate(found, 1)}
+    if any(name not in place for name in skeleton.joint_names):
+        return False
+    for joint, parent in enumerate(skeleton.parent):
+        if parent < 0:
+            continue
+        names = skeleton.joint_names[joint], skeleton.joint_names[parent]
+        way = source.rest_position[place[names[0]]] - source.rest_position[place[names[1]]]
+        ours = skeleton.offset[joint]
+        length = np.linalg.norm(way) * np.linalg.norm(ours)
+        if np.linalg.norm(np.cross(way, ours)) > PARALLEL * length or way @ ours < 0.0:
+            return False
+    return True
 
 
 def world_rotations(source: PosedSource, joints: JointMap, skeleton: Skeleton) -> FloatArray:
