@@ -11,7 +11,7 @@ from crowd.errors import MotionError
 from crowd.motion.body import build_skeleton
 from crowd.motion.clip import ClipKind, FootEvent
 from crowd.motion.importing.axes import UNITS, convert, find_convention
-from crowd.motion.importing.clips import mirrored, stance_drift
+from crowd.motion.importing.clips import stance_drift
 from crowd.motion.importing.example_set import NEEDS, OTHER_NEEDS, assemble, distance
 from crowd.motion.importing.importer import ImportSettings, import_clip
 from crowd.motion.importing.joint_names import FAMILIES, REQUIRED, map_joints, normalised, read_mapping
@@ -24,6 +24,7 @@ from crowd.motion.importing.labels import (
 )
 from crowd.motion.library import Calibration
 from crowd.motion.library_file import load_library, save_library
+from crowd.motion.mirror import mirrored
 from crowd.motion.procedural import built_in_library
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, slerp, swing, to_vector
 from crowd.motion.source import SourceMotion, SourceSkeleton

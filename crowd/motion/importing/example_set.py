@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crowd.motion.clip import Clip, ClipKind
-from crowd.motion.importing.clips import mirrored
 from crowd.motion.library import MotionLibrary
+from crowd.motion.mirror import mirrored
 from crowd.motion.procedural import built_in_library
 from crowd.motion.skeleton import Skeleton
 

@@ -1,0 +1,91 @@
+"""Look-up of reach examples, with SciPy's k-d tree beside it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from benchmarks.case import Case
+from crowd.blending.reach_space import ReachSpace
+from crowd.controllers.reach import built_in_reach_space
+from crowd_kernels import _jit
+from crowd_kernels.reach_space import CHUNKS, MOST_SAMPLES, NEAREST, SCRATCH, find_examples_crowd
+
+
+@dataclass
+class Hands:
+    """Hand positions and the examples found for them."""
+
+    space: ReachSpace
+    tree: cKDTree
+    part: npt.NDArray[np.int32]
+    position: npt.NDArray[np.float64]
+    near: npt.NDArray[np.int32]
+    distance: npt.NDArray[np.float64]
+    clip: npt.NDArray[np.int32]
+    weight: npt.NDArray[np.float64]
+    count: npt.NDArray[np.int32]
+
+
+def set_up(size: int, rng: np.random.Generator) -> Hands:
+    """Draw places between the examples of a standing person's right hand."""
+    _jit.set_thread_count(1)
+    space = built_in_reach_space()
+    point = space.pseudo[0].point
+    return Hands(
+        space,
+        cKDTree(point),
+        np.zeros(size, np.int32),
+        point[rng.integers(0, len(point), size)] + rng.normal(0.0, 0.02, (size, 3)),
+        np.zeros((CHUNKS, SCRATCH), np.int32),
+        np.zeros((CHUNKS, SCRATCH)),
+        np.zeros((size, MOST_SAMPLES), np.int32),
+        np.zeros((size, MOST_SAMPLES)),
+        np.zeros(size, np.int32),
+    )
+
+
+def run(hands: Hands) -> None:
+    """Look up all hands."""
+    find_examples_crowd(
+        hands.space.arrays,
+        hands.part,
+        hands.position,
+        hands.near,
+        hands.distance,
+        hands.clip,
+        hands.weight,
+        hands.count,
+    )
+
+
+def search(hands: Hands) -> None:
+    """Find the nearest points with SciPy, without weights and examples."""
+    hands.tree.query(hands.position, NEAREST)
+
+
+def check(hands: Hands) -> str | None:
+    """Compare with blends of the four nearest points that SciPy finds."""
+    pseudo = hands.space.pseudo[0]
+    distance, near = hands.tree.query(hands.position, NEAREST)
+    inverse = 1.0 / np.maximum(distance, 1e-6)
+    share = inverse - inverse[:, -1:]
+    share /= share.sum(axis=1, keepdims=True)
+    wanted = np.zeros((len(near), len(hands.space.first_key)))
+    found = np.zeros_like(wanted)
+    rows: Any = np.arange(len(near))
+    for k in range(NEAREST):
+        for b in range(pseudo.clip.shape[1]):
+            np.add.at(wanted, (rows, pseudo.clip[near[:, k], b]), share[:, k] * pseudo.weight[near[:, k], b])
+    for sample in range(MOST_SAMPLES):
+        is_used = sample < hands.count
+        np.add.at(found, (rows[is_used], hands.clip[is_used, sample]), hands.weight[is_used, sample])
+    worst = float(np.abs(wanted - found).max())
+    return None if worst < 1e-9 else f"weights differ by {worst:.2g}"
+
+
+CASES = [
+    Case("reach look-up", (1000, 10_000), set_up, run, check, peers={"scipy k-d tree": search}, bound_us=1.0)
+]

@@ -1,0 +1,397 @@
+"""The reach space: which examples to blend so that a hand comes to a place.
+
+Examples are points at their apex hand position. Between them stand pseudo-examples, blends whose true hand
+position is known; they fill the space so densely that the nearest ones answer any question.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import Delaunay, cKDTree
+from scipy.stats import qmc
+
+from crowd.errors import MotionError, describe
+from crowd.motion.clip import Clip
+from crowd.motion.clip_table import rows, sample_keys
+from crowd.motion.rotation import multiply, rotate
+from crowd.motion.skeleton import Skeleton
+from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.reach_space import BLENDED, CHUNKS, MOST_SAMPLES, SCRATCH, ReachArrays, find_examples_crowd
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int32]
+
+LARGEST_GAP = 0.05
+"""No place between the examples is farther from a pseudo-example, m."""
+SPACING = 0.041
+"""Pseudo-examples keep at least this distance, m."""
+BLENDS_PER_ROUND = 256
+"""Blends that are tried in each tetrahedron in one round; a round without a hit ends its search."""
+MOST_ROUNDS = 40
+LEAF_POINTS = 8
+"""Most points in a leaf of the k-d tree."""
+MARGIN = 1.0
+"""How far beyond the examples places are looked up, m; those farther off are brought in."""
+BODY_RADIUS = 0.17
+"""Hands of blends closer to the trunk's axis than this would be inside the body, m."""
+WIDEST_TURN = np.radians(75.0)
+"""Examples farther apart than this about the body's axis are not blended, rad."""
+SEED = 5
+SIDES = ("right", "left")
+
+
+@dataclass(frozen=True)
+class ReachExamples:
+    """Examples of one hand.
+
+    Attributes
+    ----------
+    clips : tuple of Clip
+    side : str
+        ``"left"`` or ``"right"`` hand.
+    position : (E, 3) float64
+        Hand at the apex in the root frame, m.
+    rotation : (E, C, 4) float64
+        Local rotations of the joints from pelvis to hand at the apex, signs aligned.
+    pelvis : (E, 3) float64
+        Pelvis at the apex, m.
+    """
+
+    clips: tuple[Clip, ...]
+    side: str
+    position: FloatArray
+    rotation: FloatArray
+    pelvis: FloatArray
+
+
+@dataclass(frozen=True)
+class PseudoExamples:
+    """Blends of one hand's examples, the examples themselves first.
+
+    Attributes
+    ----------
+    point : (P, 3) float64
+        True hand position, m.
+    clip : (P, 4) int32
+        Examples that are blended.
+    weight : (P, 4) float64
+    corners : (T, 4) int32
+        Examples around the cells that were filled.
+    """
+
+    point: FloatArray
+    clip: IntArray
+    weight: FloatArray
+    corners: IntArray
+
+
+@dataclass(frozen=True)
+class ReachSpace:
+    """Sets of examples with what fills the space between them; one set for each hand and body.
+
+    Attributes
+    ----------
+    examples : tuple of ReachExamples
+        One for each set.
+    pseudo : tuple of PseudoExamples
+    arrays : ReachArrays
+        What the look-up kernel reads; examples are numbered over all sets.
+    key_rotation : (K, 256) float32
+        Key frames of all examples as pose rows, signs aligned over all keys.
+    key_pelvis : (K, 3) float32
+    first_key, key_count : (E,) int32
+    apex_key : (E,) float64
+        Place of the apex among the keys of an example.
+    apex_time, end_time : (E,) float64
+        s.
+    pelvis_rest : (S, 3) float64
+        Pelvis of each set at rest, m.
+    """
+
+    examples: tuple[ReachExamples, ...]
+    pseudo: tuple[PseudoExamples, ...]
+    arrays: ReachArrays
+    key_rotation: npt.NDArray[np.float32]
+    key_pelvis: npt.NDArray[np.float32]
+    first_key: IntArray
+    key_count: IntArray
+    apex_key: FloatArray
+    apex_time: FloatArray
+    end_time: FloatArray
+    pelvis_rest: FloatArray
+
+    @classmethod
+    def build(cls, skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> "ReachSpace":
+        """Fill the space between examples.
+
+        Parameters
+        ----------
+        skeleton : Skeleton
+        sets : sequence of sequences of Clip
+            Examples of each set, all of one hand.
+
+        Raises
+        ------
+        MotionError
+            A set has too few examples, or they all lie in one plane.
+        """
+        clips = [clip for part in sets for clip in part]
+        sampled = [sample_keys(clip) for clip in clips]
+        count = np.array([len(rotation) for rotation, _ in sampled], np.int32)
+        first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
+        key_rotation = rows(np.concatenate([rotation for rotation, _ in sampled]))
+        key_pelvis = np.concatenate([pelvis for _, pelvis in sampled]).astype(np.float32)
+        labels = [clip.reach for clip in clips]
+        apex_time = np.array([label.apex for label in labels if label is not None])
+        end_time = np.array([clip.duration for clip in clips])
+        apex_key = apex_time / end_time * (count - 1)
+        examples: list[ReachExamples] = []
+        pseudo: list[PseudoExamples] = []
+        begin = 0
+        for part in sets:
+            members = np.arange(begin, begin + len(part))
+            examples.append(
+                apex_examples(skeleton, tuple(part), members, key_rotation, key_pelvis, first + apex_key)
+            )
+            image = mirrored(examples[-1], examples[-2], pseudo[-1]) if pseudo else None
+            pseudo.append(image or fill(skeleton, examples[-1]))
+            begin += len(part)
+        starts = np.cumsum([0, *(len(part) for part in sets)])
+        rest = np.array([key_pelvis[first[start]] for start in starts[:-1]], np.float64)
+        return cls(
+            tuple(examples),
+            tuple(pseudo),
+            pack(pseudo, starts),
+            key_rotation,
+            np.ascontiguousarray(key_pelvis),
+            first,
+            count,
+            apex_key,
+            apex_time,
+            end_time,
+            rest,
+        )
+
+    def locate(self, part: npt.ArrayLike, position: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
+        """Look up hand positions.
+
+        Parameters
+        ----------
+        part : int or (N,) int array
+            Set.
+        position : (N, 3) array
+            m.
+
+        Returns
+        -------
+        clip : (N, 12) int32
+        weight : (N, 12) float64
+            0 after the last example.
+        """
+        points = np.ascontiguousarray(np.atleast_2d(np.asarray(position, np.float64)))
+        sets = np.ascontiguousarray(np.broadcast_to(np.asarray(part, np.int32), len(points)))
+        clip = np.zeros((len(points), MOST_SAMPLES), np.int32)
+        weight, count = np.zeros((len(points), MOST_SAMPLES)), np.zeros(len(points), np.int32)
+        near, distance = np.zeros((CHUNKS, SCRATCH), np.int32), np.zeros((CHUNKS, SCRATCH))
+        find_examples_crowd(self.arrays, sets, points, near, distance, clip, weight, count)
+        weight[np.arange(MOST_SAMPLES) >= count[:, None]] = 0.0
+        return clip, weight
+
+
+def apex_examples(
+    skeleton: Skeleton,
+    clips: tuple[Clip, ...],
+    members: npt.NDArray[np.integer],
+    key_rotation: npt.NDArray[np.float32],
+    key_pelvis: npt.NDArray[np.float32],
+    apex_row: FloatArray,
+) -> ReachExamples:
+    """Poses of examples at their apex, interpolated between keys as the blend does, and where the hand is."""
+    place = apex_row[members]
+    before = np.floor(place).astype(int)
+    after = np.minimum(before + 1, len(key_rotation) - 1)
+    share = (place - before)[:, None]
+    label = clips[0].reach
+    side = label.side if label is not None else "right"
+    chain = arm_chain(skeleton, side)
+    row = (1.0 - share) * key_rotation[before] + share * key_rotation[after]
+    rotation = row.reshape(-1, 4, PADDED_JOINTS)[:, :, chain].transpose(0, 2, 1)
+    rotation = rotation / np.linalg.norm(rotation, axis=2, keepdims=True)
+    pelvis = (1.0 - share) * key_pelvis[before] + share * key_pelvis[after]
+    position = hand_position(skeleton, side, rotation, pelvis)
+    return ReachExamples(clips, side, position, rotation, pelvis)
+
+
+def arm_chain(skeleton: Skeleton, side: str) -> list[int]:
+    """Joints from the pelvis to a hand."""
+    chain = [skeleton.joint(f"{side}_hand")]
+    while chain[0] > 0:
+        chain.insert(0, int(skeleton.parent[chain[0]]))
+    return chain
+
+
+def hand_position(skeleton: Skeleton, side: str, rotation: FloatArray, pelvis: FloatArray) -> FloatArray:
+    """Hand in the root frame, (F, 3), for rotations of its chain (F, C, 4) and pelvis positions (F, 3)."""
+    place, turned = pelvis, rotation[:, 0]
+    for number, joint in enumerate(arm_chain(skeleton, side)[1:], 1):
+        place = place + rotate(turned, skeleton.offset[joint])
+        turned = multiply(turned, rotation[:, number])
+    return place
+
+
+def blend_positions(
+    skeleton: Skeleton, examples: ReachExamples, clip: IntArray, weight: FloatArray
+) -> FloatArray:
+    """Hand positions (P, 3) of blends of four examples each."""
+    rotation = (weight[:, :, None, None] * examples.rotation[clip]).sum(axis=1)
+    rotation /= np.linalg.norm(rotation, axis=2, keepdims=True)
+    pelvis = (weight[:, :, None] * examples.pelvis[clip]).sum(axis=1)
+    return hand_position(skeleton, examples.side, rotation, pelvis)
+
+
+def fill(skeleton: Skeleton, examples: ReachExamples) -> PseudoExamples:
+    """Fill the space between examples with blends.
+
+    The examples are tessellated around the body: by angle about its axis, distance from it and height. Each
+    tetrahedron is filled with blends of its corners, so that blends next to each other are alike; those too
+    close to others are left out.
+
+    Notes
+    -----
+    **Source:** pseudo-examples of Kovar, Gleicher 2004, section 5.2.
+    **Differs from the source:** weights of a low-discrepancy sequence inside a tessellation instead of random
+    weights of the nearest examples, so that neighbours have one style; spacing instead of a number of tries.
+    """
+    count = len(examples.clips)
+    corners = cells_around(examples.position, 1.0 if examples.side == "left" else -1.0)
+    if len(corners) == 0:
+        raise MotionError(
+            describe(
+                "reach examples", "do not span a space", f"{count} examples", "at least four, well spread"
+            )
+        )
+    clip = np.zeros((count, BLENDED), np.int32)
+    clip[:, 0] = np.arange(count)
+    weight = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    point = examples.position
+    draws = qmc.Sobol(BLENDED - 1, seed=SEED)
+    has_gaps = np.ones(len(corners), bool)
+    for _ in range(MOST_ROUNDS):
+        cells = np.flatnonzero(has_gaps)
+        if not len(cells):
+            break
+        # Gaps between sorted uniform numbers are spread evenly over all weights of sum 1.
+        ordered = np.sort(draws.random(BLENDS_PER_ROUND), axis=1)
+        tried_weight = np.tile(np.diff(ordered, axis=1, prepend=0.0, append=1.0), (len(cells), 1))
+        cell = np.repeat(cells, BLENDS_PER_ROUND)
+        tried = blend_positions(skeleton, examples, corners[cell], tried_weight)
+        is_outside = np.hypot(tried[:, 0], tried[:, 2]) > BODY_RADIUS
+        distance, _ = cKDTree(point).query(tried, distance_upper_bound=SPACING)
+        new = np.flatnonzero(np.isinf(distance) & is_outside)
+        has_gaps[:] = False
+        has_gaps[cell[new]] = True
+        new = new[spaced(tried[new], SPACING)]
+        point = np.concatenate([point, tried[new]])
+        clip = np.concatenate([clip, corners[cell[new]]])
+        weight = np.concatenate([weight, tried_weight[new]])
+    return PseudoExamples(point, clip, weight, corners)
+
+
+def mirrored(examples: ReachExamples, other: ReachExamples, pseudo: PseudoExamples) -> PseudoExamples | None:
+    """Mirror the blends of another hand's examples, if these examples are mirror images; else None."""
+    flip = np.array([-1.0, 1.0, 1.0])
+    if len(examples.clips) != len(other.clips) or examples.side == other.side:
+        return None
+    if not np.allclose(examples.position, other.position * flip, atol=1e-5):
+        return None
+    return replace(pseudo, point=pseudo.point * flip)
+
+
+def cells_around(position: FloatArray, side: float) -> IntArray:
+    """Tessellate hand positions around the body's axis; (T, 4) examples at the corners.
+
+    `side` is 1 for the left hand, -1 for the right one, which reaches behind by turning to its own side.
+    """
+    across, ahead = side * position[:, 0], position[:, 2]
+    # The cut lies opposite to the middle of what a hand reaches, behind the other shoulder.
+    angle = np.mod(np.arctan2(across, ahead) + np.radians(130.0), 2.0 * np.pi) - np.radians(130.0)
+    radius = np.hypot(across, ahead)
+    # An angle weighs like the arc at the middle of all distances.
+    flat = np.stack([np.median(radius) * angle, position[:, 1], radius], axis=1)
+    if len(flat) < BLENDED or np.linalg.matrix_rank(flat - flat.mean(axis=0), tol=1e-3) < 3:
+        return np.zeros((0, BLENDED), np.int32)
+    corners = Delaunay(flat, qhull_options="QJ Pp").simplices
+    return np.asarray(corners[np.ptp(angle[corners], axis=1) < WIDEST_TURN], np.int32)
+
+
+def spaced(point: FloatArray, spacing: float) -> npt.NDArray[np.intp]:
+    """Choose points that keep a distance, first come first served; (P,) indices."""
+    if not len(point):
+        return np.zeros(0, np.intp)
+    neighbours = cKDTree(point).query_ball_point(point, spacing)
+    is_blocked = np.zeros(len(point), bool)
+    kept = []
+    for number, close in enumerate(neighbours):
+        if not is_blocked[number]:
+            kept.append(number)
+            is_blocked[close] = True
+    return np.array(kept, np.intp)
+
+
+def pack(pseudo: Sequence[PseudoExamples], starts: npt.NDArray[np.integer]) -> ReachArrays:
+    """Prepare sets for the look-up kernel; `starts` numbers the first example of each set."""
+    point: list[FloatArray] = []
+    clip, weight, box, leaf_start, leaf_count = [], [], [], [], []
+    for part, start in zip(pseudo, starts[:-1], strict=True):
+        order, leaves = tree_order(part.point)
+        begin = sum(len(entry) for entry in point)
+        point.append(part.point[order])
+        clip.append(part.clip[order] + start)
+        weight.append(part.weight[order])
+        box.append(node_boxes(part.point[order], leaves))
+        count = len(leaves) - 1
+        leaf_count.append(count)
+        leaf_start.append(np.concatenate([np.zeros(count, np.int64), leaves + begin]))
+    nodes = np.concatenate([[0], np.cumsum([len(entry) for entry in box])[:-1]])
+    return ReachArrays(
+        np.ascontiguousarray(np.concatenate(point)),
+        np.concatenate(clip).astype(np.int32),
+        np.ascontiguousarray(np.concatenate(weight)),
+        np.array([part.point.min(axis=0) - MARGIN for part in pseudo]),
+        np.array([part.point.max(axis=0) + MARGIN for part in pseudo]),
+        nodes.astype(np.int32),
+        np.array(leaf_count, np.int32),
+        np.ascontiguousarray(np.concatenate(box)),
+        np.concatenate(leaf_start).astype(np.int32),
+    )
+
+
+def tree_order(point: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.int64]]:
+    """Sort points (P, 3) into the leaves of a balanced tree: order, and first place of each leaf."""
+    depth = max(int(np.ceil(np.log2(max(len(point), 1) / LEAF_POINTS))), 0)
+    parts = [np.arange(len(point))]
+    for _ in range(depth):
+        halves = []
+        for part in parts:
+            axis = int(np.argmax(np.ptp(point[part], axis=0))) if len(part) else 0
+            ordered = part[np.argsort(point[part, axis], kind="stable")]
+            halves += [ordered[: len(part) // 2], ordered[len(part) // 2 :]]
+        parts = halves
+    return np.concatenate(parts), np.concatenate([[0], np.cumsum([len(part) for part in parts])])
+
+
+def node_boxes(point: FloatArray, leaves: npt.NDArray[np.int64]) -> FloatArray:
+    """Boxes of the nodes of a tree, (2 L + 1, 6): row 0 is not used, row 1 the root, the last row spare."""
+    count = len(leaves) - 1
+    box = np.full((2 * count + 1, 6), np.inf)
+    box[:, 3:] = -np.inf
+    for leaf in range(count):
+        inside = point[leaves[leaf] : leaves[leaf + 1]]
+        if len(inside):
+            box[count + leaf] = [*inside.min(axis=0), *inside.max(axis=0)]
+    for node in range(count - 1, 0, -1):
+        below = box[2 * node : 2 * node + 2]
+        box[node] = [*below[:, :3].min(axis=0), *below[:, 3:].max(axis=0)]
+    return box
