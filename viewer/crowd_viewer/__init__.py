@@ -1,18 +1,22 @@
 """Pictures, videos and windows of simulations and recordings."""
 
 from crowd_viewer.camera import Camera
+from crowd_viewer.clips import Clip, clip
 from crowd_viewer.context import ViewerError
 from crowd_viewer.frame import Shown
-from crowd_viewer.picture import render, render_identities, write_picture
+from crowd_viewer.picture import Picture, render, render_identities, write_picture
 from crowd_viewer.quality import FAST, FINE, Quality
 
 __all__ = [
     "FAST",
     "FINE",
     "Camera",
+    "Clip",
+    "Picture",
     "Quality",
     "Shown",
     "ViewerError",
+    "clip",
     "render",
     "render_identities",
     "show",

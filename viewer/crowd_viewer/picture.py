@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,22 @@ from crowd_viewer.quality import FINE, Quality
 from crowd_viewer.renderer import Renderer
 
 FloatArray = npt.NDArray[np.float64]
-Picture = npt.NDArray[np.uint8]
 OUTLIERS = 0.12
 """Share of people at each side who may be outside of a picture that nobody has chosen a camera for."""
+
+
+class Picture(np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]):
+    """Pixels, (height, width, 3) uint8, the upper left one first; a notebook shows them."""
+
+    def _repr_png_(self) -> bytes | None:
+        """The picture as a notebook wants it; None for parts that are no pictures."""
+        if self.ndim != 3 or self.shape[2] != 3 or self.dtype != np.uint8 or not self.size:
+            return None
+        from PIL import Image
+
+        file = io.BytesIO()
+        Image.fromarray(np.asarray(self)).save(file, "png")
+        return file.getvalue()
 
 
 def render(
@@ -44,7 +58,7 @@ def render(
     Returns
     -------
     (height, width, 3) uint8
-        The upper left pixel first.
+        The upper left pixel first; a notebook shows it as a picture.
 
     Raises
     ------
@@ -56,7 +70,7 @@ def render(
     chosen = camera or default_camera(source.scene, frame.places, size)
     with Renderer(headless_context(), source.scene, size, quality) as renderer:
         renderer.draw(frame, chosen, keeps_levels=False)
-        return renderer.picture()
+        return renderer.picture().view(Picture)
 
 
 def render_identities(
@@ -106,7 +120,7 @@ def require_pillow(path: Path) -> None:
         raise ViewerError(describe(str(path), "is no kind of picture", path.suffix, ".png, .jpg, .webp"))
 
 
-def write_picture(path: Path, picture: Picture) -> None:
+def write_picture(path: Path, picture: npt.NDArray[np.uint8]) -> None:
     """Write a picture; the format follows the ending.
 
     Raises
