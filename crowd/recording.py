@@ -30,6 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[Any]
 AnyArray = npt.NDArray[Any]
 Rows = int | slice
+HDF5_BEGIN = b"\x89HDF\r\n\x1a\n"
+SUPERBLOCK_BYTES = 48
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class Recording:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
+        _check_length(self.path)
         try:
             self._file = h5py.File(self.path, "r", libver="latest", swmr=True)
         except (OSError, RuntimeError) as error:
@@ -269,6 +272,32 @@ class Recording:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _check_length(path: Path) -> None:
+    """Refuse a file whose end is missing: the HDF5 library does not survive one in single-writer mode.
+
+    Where the end should be stands in the superblock (HDF5 file format 3.0, section II.A, version 2 and 3).
+    """
+    try:
+        with path.open("rb") as file:
+            begin = file.read(SUPERBLOCK_BYTES)
+        size = path.stat().st_size
+    except OSError:
+        return
+    if len(begin) < SUPERBLOCK_BYTES:
+        if begin.startswith(HDF5_BEGIN):
+            raise RecordingError(describe(str(path), "is cut off", f"{size} bytes"))
+        return
+    version, address_bytes, is_open = begin[8], begin[9], begin[11] != 0
+    # Without room taken in advance, the end of a run that was killed may not have been written.
+    is_known = not is_open or hasattr(os, "posix_fallocate")
+    if begin.startswith(HDF5_BEGIN) and version in (2, 3) and address_bytes == 8 and is_known:
+        end = int.from_bytes(begin[28:36], "little")
+        if size < end:
+            raise RecordingError(
+                describe(str(path), "is cut off", f"{size} of {end} bytes", "the whole file")
+            )
 
 
 def _unit(rotation: AnyArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Protocol
 
@@ -126,12 +127,16 @@ def _opened(path: Path, record: Path | None) -> Recording:
 
     from crowd.trajectories import FollowingSimulation, open_recording
 
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(f"walking along {path.name}", total=1.0, visible=False)
+    with ExitStack() as stack:
+        progress: Progress | None = None
 
         def show(frame: Frame) -> None:
+            nonlocal progress
             assert isinstance(frame.simulation, FollowingSimulation)
+            if progress is None:
+                progress = stack.enter_context(Progress(console=Console(stderr=True), transient=True))
+                progress.add_task(f"walking along {path.name}", total=1.0)
             share = frame.time / max(frame.simulation.seconds, frame.time)
-            progress.update(task, completed=share, visible=True)
+            progress.update(progress.task_ids[0], completed=share)
 
         return open_recording(path, record=record, on_frame=show)

@@ -21,12 +21,12 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from crowd.errors import RecordingError, describe
+from crowd.recording import HDF5_BEGIN
 from crowd.trajectories.trajectories import Trajectories, split_into_ways
 
 FloatArray = npt.NDArray[np.float64]
 
 SQLITE_BEGIN = b"SQLite format 3\x00"
-HDF5_BEGIN = b"\x89HDF\r\n\x1a\n"
 ALLOWED = "JuPedSim sqlite, text or HDF5, or CSV of t, id, x, y"
 CSV_COLUMNS = {"t": ("t", "time", "t/s", "time/s"), "id": ("id",), "x": ("x", "x/m"), "y": ("y", "y/m")}
 UNITS = {"m": 1.0, "cm": 0.01}

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import h5py
 
-from crowd.recording import Recording
+from crowd.recording import HDF5_BEGIN, Recording
 from crowd.simulation import Frame
 from crowd.trajectories.files import load_trajectories
 from crowd.trajectories.following import record_bodies
@@ -57,11 +57,13 @@ def open_recording(
 
 def is_recording(path: Path) -> bool:
     """The file is a recording, or says with its ending that it should be one."""
-    if not path.is_file() or not h5py.is_hdf5(path):
-        return path.suffix.lower() in (".h5", ".hdf5")
     try:
-        with h5py.File(path, "r", libver="latest", swmr=True) as file:
+        with path.open("rb") as begin:
+            is_hdf5 = begin.read(len(HDF5_BEGIN)) == HDF5_BEGIN
+        if not is_hdf5:
+            return path.suffix.lower() in (".h5", ".hdf5")
+        with h5py.File(path, "r") as file:
             return "trajectory" not in file
     except (OSError, RuntimeError):
-        # `Recording` tells what is wrong with it.
+        # A run that still goes on, or `Recording` tells what is wrong.
         return True

@@ -1,4 +1,4 @@
-"""A real window, driven by real events of mouse and keys, its pictures compared with those made without it."""
+"""A real window, driven by real events of mouse and keys, its pictures compared with headless ones."""
 
 import os
 import shutil

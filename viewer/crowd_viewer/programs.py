@@ -6,7 +6,6 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from crowd.errors import describe
 from crowd_viewer.context import ViewerError
 
 if TYPE_CHECKING:
@@ -43,7 +42,10 @@ def compile_program(
         )
     except Exception as error:
         where = f"shaders {', '.join((*vertex, *fragment))}"
-        raise ViewerError(describe(where, "the driver cannot compile them", str(error).strip())) from error
+        # The rest of the log is headings; lines count through all files put together.
+        log = [line.strip() for line in str(error).splitlines() if "error" in line.lower()]
+        told = "; ".join(log) or str(error).strip()
+        raise ViewerError(f"{where}: the driver cannot compile them: {told}") from error
     if "View" in program:
         program["View"].binding = VIEW_BINDING  # type: ignore[union-attr]
     return program
