@@ -204,13 +204,18 @@ def glance(data: Onlookers) -> None:
         state.velocity_world,
         state.yaw,
         state.is_active,
+        data.gaze.may_glance,
+        0.1,
         data.active,
         1,
         data.step,
         data.step * DT,
         data.gaze.keys,
         state.glance_until,
-        state.glance_character,
+        state.is_glancing,
+        state.gaze_kind,
+        state.gaze_index,
+        state.gaze_trunk,
     )
 
 
@@ -218,6 +223,7 @@ def set_up_glances(size: int, rng: np.random.Generator) -> Onlookers:
     """Sort people into cells."""
     data = set_up(size, rng)
     radius = np.full(size, 0.25)
+    data.gaze.release(data.state, data.active)
     data.avoidance.steer_cells.sort(data.state.position_world, radius, data.active, 5.0)
     return data
 
@@ -227,10 +233,10 @@ def check_glance(data: Onlookers) -> str | None:
     for _ in range(600):
         glance(data)
     state, limits = data.state, data.gaze.glance_limits
-    looking = np.flatnonzero(state.glance_character >= 0)
+    looking = np.flatnonzero(state.is_glancing)
     if not 0.01 < looking.size / state.capacity < 0.5:
         return f"{looking.size} of {state.capacity} look at somebody"
-    way = state.position_world[state.glance_character[looking]] - state.position_world[looking]
+    way = state.position_world[state.gaze_index[looking]] - state.position_world[looking]
     angle = np.arctan2(way[:, 0], way[:, 2]) - state.yaw[looking]
     angle = np.abs(np.angle(np.exp(1j * angle)))
     if angle.max() > limits.field or np.hypot(way[:, 0], way[:, 2]).max() > limits.distance:

@@ -142,8 +142,6 @@ class State:
     """0 no target, 1 turning, 2 on target, 3 out of reach of the limits, 4 refused. (character,)"""
     is_glancing: BoolArray = _array(dtype=np.bool_)
     """The gaze is an idle glance, which any wanted gaze replaces. (character,)"""
-    glance_character: IntArray = _array(dtype=np.int32, fill=-1)
-    """Who is glanced at, -1 for nobody. (character,)"""
     glance_until: FloatArray = _array()
     """Time of the next choice of a glance, s. (character,)"""
     saccade_mode: ByteArray = _array(dtype=np.uint8)

@@ -25,8 +25,9 @@ from crowd_kernels.gaze import (
     eye_point_crowd,
     gaze_crowd,
     scratch_length,
+    split_gazing,
 )
-from crowd_kernels.glance import NOBODY, GlanceLimits, glance_crowd
+from crowd_kernels.glance import GlanceLimits, glance_crowd
 from crowd_kernels.saccade import OFF, SaccadeModes, offset_eyes_crowd, saccade_crowd
 
 FRAME_RATE_OF_INTERVALS = 30.0
@@ -60,8 +61,8 @@ def degrees(pitch: float, heading: float, roll: float) -> tuple[float, float, fl
 KEYS = (
     GazeKey(("spine_1", "spine_2"), degrees(15.0, 24.0, 10.0), share=0.35, rate=6.0, is_trunk=True),
     GazeKey(("spine_3", "spine_4"), degrees(6.0, 15.0, 5.0), share=0.35, rate=7.0, is_trunk=True),
-    GazeKey(("neck_1", "neck_2"), degrees(25.0, 50.0, 20.0), share=1.0, rate=10.0),
-    GazeKey(("head",), degrees(20.0, 40.0, 15.0), share=1.5, rate=11.0),
+    GazeKey(("neck_1", "neck_2"), degrees(25.0, 50.0, 20.0), share=1.0, rate=9.0),
+    GazeKey(("head",), degrees(20.0, 40.0, 15.0), share=1.5, rate=10.0),
 )
 """Limits of Thiebaux and others as implemented, with neck and head together at 90 degrees to a side."""
 
@@ -127,9 +128,10 @@ class GazeSettings:
     eye_pitch: float = math.radians(35.0)
     eye_heading: float = math.radians(40.0)
     """Half axes of the ellipse in which eyes turn."""
-    eye_speed: float = math.radians(1000.0)
+    eye_speed: float = math.radians(800.0)
+    """Largest speed of the eyes against the head, saccades apart; above that of any human eye."""
     head_speed: float = math.radians(180.0)
-    """Largest speeds, saccades apart."""
+    """Largest speed that gaze gives to the head."""
     fade_rate: float = 14.0
     """1/s. Rate with which gaze comes and goes; larger: quicker, less soft."""
     walking_trunk: float = 0.3
@@ -154,7 +156,6 @@ class Gaze:
         "gaze_error",
         "gaze_status",
         "is_glancing",
-        "glance_character",
         "glance_until",
         "saccade_mode",
         "saccade_start",
@@ -187,6 +188,8 @@ class Gaze:
         """Who glances at others when nothing else is looked at. (character,)"""
         self._cells = None if avoidance is None else avoidance.steer_cells
         self._trunk: Float32Array = np.ones(capacity, np.float32)
+        self._turned: IntArray = np.zeros(capacity, np.int32)
+        self._resting: IntArray = np.zeros(capacity, np.int32)
         self.scratch: Float32Array = np.zeros(
             (CHUNKS, scratch_length(self.arrays.joint.shape[0])), np.float32
         )
@@ -238,7 +241,6 @@ class Gaze:
         """Let the gaze fade; idle glances may come again."""
         state.gaze_kind[characters] = NOTHING
         state.is_glancing[characters] = False
-        state.glance_character[characters] = NOBODY
 
     def set_mode(self, state: State, characters: IntArray, mode: str | None) -> None:
         """Set the attention that saccades show, one of `MODES`; None for eyes without saccades."""
@@ -251,7 +253,6 @@ class Gaze:
         state.gaze_index[characters] = index
         state.gaze_trunk[characters] = trunk
         state.is_glancing[characters] = False
-        state.glance_character[characters] = NOBODY
 
     def evaluate(self, step: Step) -> None:
         """Choose glances, advance saccades, and turn everyone who looks or has just looked at something."""
@@ -273,28 +274,28 @@ class Gaze:
             state.saccade_until,
             state.saccade_offset,
         )
-        kind = state.gaze_kind[step.active]
-        is_turned = (kind != NOTHING) | (state.gaze_weight[step.active] > 0.0)
-        self._turn(step, people, step.active[is_turned])
-        is_beside = (state.saccade_offset[step.active] != 0.0).any(axis=1)
-        resting = step.active[is_beside & ~is_turned]
-        if resting.size:
+        turned, resting = split_gazing(
+            step.active,
+            state.gaze_kind,
+            state.gaze_weight,
+            state.saccade_offset,
+            self._turned,
+            self._resting,
+        )
+        self._turn(step, people, self._turned[:turned])
+        if resting:
             offset_eyes_crowd(
                 self.arrays.eye,
                 self.settings.eye_pitch,
                 self.settings.eye_heading,
                 state.saccade_offset,
-                resting,
+                self._resting[:resting],
                 state.pose_rotation,
             )
 
     def _glance(self, step: Step, cells: CellTable) -> None:
         """Let people who look at nothing in particular choose somebody."""
-        state, active = step.state, step.active
-        is_free = (state.gaze_kind[active] == NOTHING) | state.is_glancing[active]
-        free = active[is_free & self.may_glance[active]]
-        if free.size == 0:
-            return
+        state = step.state
         glance_crowd(
             cells.cell_start,
             cells.point,
@@ -307,20 +308,19 @@ class Gaze:
             state.velocity_world,
             state.yaw,
             state.is_active,
-            free,
+            self.may_glance,
+            self.settings.glances.trunk,
+            step.active,
             step.seed,
             step.index,
             step.time,
             self.keys,
             state.glance_until,
-            state.glance_character,
+            state.is_glancing,
+            state.gaze_kind,
+            state.gaze_index,
+            state.gaze_trunk,
         )
-        whom = state.glance_character[free]
-        glances = whom != NOBODY
-        state.is_glancing[free] = glances
-        state.gaze_kind[free] = np.where(glances, CHARACTER, NOTHING)
-        state.gaze_index[free] = whom
-        state.gaze_trunk[free[glances]] = self.settings.glances.trunk
 
     def _turn(self, step: Step, people: People, turned: IntArray) -> None:
         """Follow moving targets and turn."""

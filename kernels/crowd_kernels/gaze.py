@@ -28,21 +28,18 @@ from crowd_kernels.gaze_rows import (
     TARGET,
     TRUNK,
     TURN,
-    WANTED,
     WEIGHT,
     WEIGHT_RATE,
     aim_eye_row,
+    aim_joint_row,
     begin_row,
     excess_row,
-    limit_row,
     look_back_row,
-    missing_row,
     settle_row,
     step_down_row,
     swing_row,
     turn_eye_row,
     turn_frame_row,
-    turn_joint_row,
 )
 from crowd_kernels.lanes import LANES
 from crowd_kernels.polynomial import ONE, ZERO
@@ -57,9 +54,10 @@ NOTHING, POINT, CHARACTER, OBJECT = 0, 1, 2, 3
 IDLE, TURNING, ON_TARGET, OUT_OF_REACH, REFUSED = 0, 1, 2, 3, 4
 """What has become of a gaze."""
 ON_TARGET_ERROR = np.float32(np.radians(1.0))
-TURNED = 0.1
+TURNED = np.float32(0.1)
 """From this turn on people keep to the side that they have turned to, rad."""
-FADED_WEIGHT, FADED_TURN, RESTING_WEIGHT = 1e-3, 1e-4, 1e-6
+FADED_WEIGHT, FADED_TURN, RESTING_WEIGHT = 1e-3, 1e-3, 1e-6
+"""A gaze is over below this weight and this sum of turns, rad; before, its weight stays above nothing."""
 
 
 class GazeArrays(NamedTuple):
@@ -113,120 +111,189 @@ def scratch_length(joint_count: int) -> int:
     return joint_count * JOINT_ROW + 2 * EYE_ROW + CARRY_ROW + JOINT_ROW
 
 
+@kernel
+def split_gazing(
+    active: Any, kind: Any, weight: Any, saccade: Any, out_turned: Any, out_resting: Any
+) -> tuple[int, int]:
+    """List who is turned by gaze, and who only moves the eyes.
+
+    Parameters
+    ----------
+    active : (A,) int32
+        Characters, each once; 0 to N - 1.
+    kind : (N,) uint8
+        0 for nobody to look at.
+    weight : (N,) float32
+        Share of the gaze in the pose.
+    saccade : (N, 2) float32
+        Turn of the eyes, rad.
+    out_turned : (>= A,) int32
+        Written: characters who look at something, or whose turn is fading.
+    out_resting : (>= A,) int32
+        Written: others whose eyes are beside their middle.
+
+    Returns
+    -------
+    tuple of int
+        How many there are of both.
+    """
+    turned, resting = 0, 0
+    for index in range(active.shape[0]):
+        character = active[index]
+        if kind[character] != NOTHING or weight[character] > ZERO:
+            out_turned[turned] = character
+            turned += 1
+        elif saccade[character, 0] != ZERO or saccade[character, 1] != ZERO:
+            out_resting[resting] = character
+            resting += 1
+    return turned, resting
+
+
 @inlined_kernel
-def gather_character(
+def gather_root(
     arrays: GazeArrays,
     segment_scale: Any,
     position_world: Any,
     yaw: Any,
-    trunk: float,
-    is_looking: bool,
+    trunk: Any,
+    kind: Any,
     target_world: Any,
-    pose: Any,
-    pelvis: Any,
+    pose_pelvis: Any,
+    weight: Any,
+    weight_rate: Any,
+    active: Any,
+    first: int,
+    carry: Any,
+) -> None:
+    """Write pelvis, target in the root frame, and weight of 16 characters.
+
+    Parameters
+    ----------
+    first : int
+        Place in `active` of the first lane.
+    carry : (CARRY_ROW,) float32
+        Written.
+
+    Notes
+    -----
+    All other arguments are those of `gaze_crowd`.
+    """
+    last = active.shape[0] - 1
+    for lane in range(LANES):
+        character = active[min(first + lane, last)]
+        cosine, sine = math.cos(yaw[character]), math.sin(yaw[character])
+        x = target_world[character, 0] - position_world[character, 0]
+        z = target_world[character, 2] - position_world[character, 2]
+        carry[TARGET + lane] = cosine * x - sine * z
+        carry[TARGET + LANES + lane] = target_world[character, 1]
+        carry[TARGET + 2 * LANES + lane] = sine * x + cosine * z
+        leg = segment_scale[character, arrays.leg_segment]
+        for axis in range(3):
+            carry[POSITION + axis * LANES + lane] = pose_pelvis[character, axis] * leg
+        carry[GOAL + lane] = ONE if kind[character] != NOTHING else ZERO
+        carry[TRUNK + lane] = trunk[character]
+        carry[WEIGHT + lane] = weight[character]
+        carry[WEIGHT_RATE + lane] = weight_rate[character]
+
+
+@inlined_kernel
+def gather_gaze(
+    arrays: GazeArrays,
+    segment_scale: Any,
+    pose_rotation: Any,
     turn: Any,
-    rate: Any,
+    turn_rate: Any,
     eye_turn: Any,
     saccade: Any,
-    lane: int,
+    active: Any,
+    first: int,
     carry: Any,
     eyes: Any,
     joints: Any,
 ) -> None:
-    """Write what the rows need of one character into its lane.
+    """Write pelvis rotation, chain and eyes of 16 characters.
 
     Parameters
     ----------
-    trunk : float
-        Share of the trunk, 0 to 1.
-    is_looking : bool
-        There is a target.
-    lane : int
-        0 to 15.
+    first : int
+        Place in `active` of the first lane.
     carry, eyes, joints
-        Rows of the block, written in one lane.
+        Rows of the block, written.
 
     Notes
     -----
-    All other arguments are the character's rows of those of `gaze_crowd`.
+    All other arguments are those of `gaze_crowd`.
     """
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    x = target_world[0] - position_world[0]
-    z = target_world[2] - position_world[2]
-    carry[TARGET + lane] = cosine * x - sine * z
-    carry[TARGET + LANES + lane] = target_world[1]
-    carry[TARGET + 2 * LANES + lane] = sine * x + cosine * z
-    leg = segment_scale[arrays.leg_segment]
-    for axis in range(3):
-        carry[POSITION + axis * LANES + lane] = pelvis[axis] * leg
-    for component in range(4):
-        carry[ROTATION + component * LANES + lane] = pose[component * PADDED_JOINTS]
-    carry[GOAL + lane] = ONE if is_looking else ZERO
-    carry[TRUNK + lane] = trunk
-    heading = ZERO
-    for place in range(arrays.joint.shape[0]):
-        first = place * JOINT_ROW + lane
+    last = active.shape[0] - 1
+    for lane in range(LANES):
+        character = active[min(first + lane, last)]
         for component in range(4):
-            joints[first + ROTATION + component * LANES] = pose[
-                component * PADDED_JOINTS + arrays.joint[place]
-            ]
-        for axis in range(3):
-            joints[first + TURN + axis * LANES] = turn[3 * place + axis]
-            joints[first + RATE + axis * LANES] = rate[3 * place + axis]
-        joints[first + SCALE] = segment_scale[arrays.segment[place]]
-        heading += turn[3 * place + 1]
-    carry[SIDE + lane] = ZERO if abs(heading) < TURNED else (ONE if heading > ZERO else -ONE)
-    for side in range(2):
-        first = side * EYE_ROW + lane
-        for component in range(4):
-            eyes[first + ROTATION + component * LANES] = pose[component * PADDED_JOINTS + arrays.eye[side]]
-        for axis in range(2):
-            eyes[first + TURN + axis * LANES] = eye_turn[2 * side + axis]
-            eyes[first + OFFSET + axis * LANES] = saccade[axis]
-        eyes[first + EYE_SCALE] = segment_scale[arrays.eye_segment[side]]
+            carry[ROTATION + component * LANES + lane] = pose_rotation[character, component * PADDED_JOINTS]
+        heading = ZERO
+        for place in range(arrays.joint.shape[0]):
+            at = place * JOINT_ROW + lane
+            joint = arrays.joint[place]
+            for component in range(4):
+                value = pose_rotation[character, component * PADDED_JOINTS + joint]
+                joints[at + ROTATION + component * LANES] = value
+            for axis in range(3):
+                joints[at + TURN + axis * LANES] = turn[character, 3 * place + axis]
+                joints[at + RATE + axis * LANES] = turn_rate[character, 3 * place + axis]
+            joints[at + SCALE] = segment_scale[character, arrays.segment[place]]
+            heading += turn[character, 3 * place + 1]
+        side = ONE if heading > ZERO else -ONE
+        carry[SIDE + lane] = side if abs(heading) > TURNED else ZERO
+        for eye in range(2):
+            at = eye * EYE_ROW + lane
+            joint = arrays.eye[eye]
+            for component in range(4):
+                value = pose_rotation[character, component * PADDED_JOINTS + joint]
+                eyes[at + ROTATION + component * LANES] = value
+            for axis in range(2):
+                eyes[at + TURN + axis * LANES] = eye_turn[character, 2 * eye + axis]
+                eyes[at + OFFSET + axis * LANES] = saccade[character, axis]
+            eyes[at + EYE_SCALE] = segment_scale[character, arrays.eye_segment[eye]]
 
 
 @inlined_kernel
-def scatter_character(
-    arrays: GazeArrays, lane: int, eyes: Any, joints: Any, pose: Any, turn: Any, rate: Any, eye_turn: Any
-) -> float:
-    """Write a lane back to the rows of its character.
-
-    Parameters
-    ----------
-    lane : int
-        0 to 15.
-    eyes, joints
-        Rows of the block.
-
-    Returns
-    -------
-    float
-        Sum of all turns that the gaze holds, rad.
-
-    Notes
-    -----
-    All other arguments are the character's rows of those of `gaze_crowd`.
-    """
-    held = 0.0
-    for place in range(arrays.joint.shape[0]):
-        first = place * JOINT_ROW + lane
-        for component in range(4):
-            pose[component * PADDED_JOINTS + arrays.joint[place]] = joints[
-                first + ROTATION + component * LANES
-            ]
-        for axis in range(3):
-            turn[3 * place + axis] = joints[first + TURN + axis * LANES]
-            rate[3 * place + axis] = joints[first + RATE + axis * LANES]
-            held += abs(turn[3 * place + axis])
-    for side in range(2):
-        first = side * EYE_ROW + lane
-        for component in range(4):
-            pose[component * PADDED_JOINTS + arrays.eye[side]] = eyes[first + ROTATION + component * LANES]
-        for axis in range(2):
-            eye_turn[2 * side + axis] = eyes[first + TURN + axis * LANES]
-            held += abs(eye_turn[2 * side + axis])
-    return held
+def scatter_gaze(
+    arrays: GazeArrays,
+    active: Any,
+    first: int,
+    carry: Any,
+    eyes: Any,
+    joints: Any,
+    out_pose_rotation: Any,
+    out_turn: Any,
+    out_turn_rate: Any,
+    out_eye_turn: Any,
+) -> None:
+    """Write chain and eyes back, and sum up all turns that gaze holds into `SUM`; arguments as above."""
+    for lane in range(min(LANES, active.shape[0] - first)):
+        character = active[first + lane]
+        held = ZERO
+        for place in range(arrays.joint.shape[0]):
+            at = place * JOINT_ROW + lane
+            joint = arrays.joint[place]
+            for component in range(4):
+                value = joints[at + ROTATION + component * LANES]
+                out_pose_rotation[character, component * PADDED_JOINTS + joint] = value
+            for axis in range(3):
+                value = joints[at + TURN + axis * LANES]
+                out_turn[character, 3 * place + axis] = value
+                out_turn_rate[character, 3 * place + axis] = joints[at + RATE + axis * LANES]
+                held += abs(value)
+        for eye in range(2):
+            at = eye * EYE_ROW + lane
+            joint = arrays.eye[eye]
+            for component in range(4):
+                value = eyes[at + ROTATION + component * LANES]
+                out_pose_rotation[character, component * PADDED_JOINTS + joint] = value
+            for axis in range(2):
+                value = eyes[at + TURN + axis * LANES]
+                out_eye_turn[character, 2 * eye + axis] = value
+                held += abs(value)
+        carry[SUM + lane] = held
 
 
 @kernel
@@ -286,8 +353,7 @@ def turn_block(arrays: GazeArrays, limits: GazeLimits, dt: float, carry: Any, ey
     for place in range(count):
         row = joints[place * JOINT_ROW : (place + 1) * JOINT_ROW]
         step_down_row(row, carry, arrays.offset[place, 0], arrays.offset[place, 1], arrays.offset[place, 2])
-        missing_row(row, carry)
-        limit_row(
+        aim_joint_row(
             row,
             carry,
             arrays.limit[place, 0],
@@ -297,7 +363,7 @@ def turn_block(arrays: GazeArrays, limits: GazeLimits, dt: float, carry: Any, ey
             arrays.bias[place, 1],
             arrays.bias[place, 2],
         )
-        turn_frame_row(row, WANTED, carry)
+        turn_frame_row(row, carry)
     excess_row(eye_x, eye_y, eye_z, eyes, limits.eye_pitch, limits.eye_heading, carry)
     for place in range(count):
         decay = np.float32(math.exp(-arrays.rate[place] * dt))
@@ -308,8 +374,6 @@ def turn_block(arrays: GazeArrays, limits: GazeLimits, dt: float, carry: Any, ey
         row = joints[place * JOINT_ROW : (place + 1) * JOINT_ROW]
         settle_row(row, carry, limits.head_speed)
         step_down_row(row, carry, arrays.offset[place, 0], arrays.offset[place, 1], arrays.offset[place, 2])
-        turn_frame_row(row, TURN, carry)
-        turn_joint_row(row)
     for side in range(2):
         eye = eyes[side * EYE_ROW : (side + 1) * EYE_ROW]
         aim_eye_row(
@@ -370,49 +434,46 @@ def gaze_chunk(
     joints = scratch[CARRY_ROW + 2 * EYE_ROW :]
     for block in range(begin, end):
         first = block * LANES
-        for lane in range(LANES):
-            character = active[min(first + lane, count - 1)]
-            gather_character(
-                arrays,
-                segment_scale[character],
-                position_world[character],
-                yaw[character],
-                trunk[character],
-                kind[character] != NOTHING,
-                target_world[character],
-                pose_rotation[character],
-                pose_pelvis[character],
-                turn[character],
-                turn_rate[character],
-                eye_turn[character],
-                saccade[character],
-                lane,
-                carry,
-                eyes,
-                joints,
-            )
-            carry[WEIGHT + lane] = weight[character]
-            carry[WEIGHT_RATE + lane] = weight_rate[character]
+        gather_root(
+            arrays,
+            segment_scale,
+            position_world,
+            yaw,
+            trunk,
+            kind,
+            target_world,
+            pose_pelvis,
+            weight,
+            weight_rate,
+            active,
+            first,
+            carry,
+        )
+        gather_gaze(
+            arrays,
+            segment_scale,
+            pose_rotation,
+            turn,
+            turn_rate,
+            eye_turn,
+            saccade,
+            active,
+            first,
+            carry,
+            eyes,
+            joints,
+        )
         turn_block(arrays, limits, dt, carry, eyes, joints)
+        scatter_gaze(arrays, active, first, carry, eyes, joints, pose_rotation, turn, turn_rate, eye_turn)
         for lane in range(min(LANES, count - first)):
             character = active[first + lane]
-            held = scatter_character(
-                arrays,
-                lane,
-                eyes,
-                joints,
-                pose_rotation[character],
-                turn[character],
-                turn_rate[character],
-                eye_turn[character],
-            )
             weight[character] = carry[WEIGHT + lane]
             weight_rate[character] = carry[WEIGHT_RATE + lane]
             error = max(eyes[ERROR + lane], eyes[EYE_ROW + ERROR + lane])
             out_error[character] = error if carry[GOAL + lane] > ZERO else ZERO
             if kind[character] == NOTHING:
                 out_status[character] = IDLE
-                if weight[character] < FADED_WEIGHT and held < FADED_TURN:
+                if weight[character] < FADED_WEIGHT and carry[SUM + lane] < FADED_TURN:
                     weight[character] = ZERO
                     weight_rate[character] = ZERO
                     turn[character, :] = ZERO

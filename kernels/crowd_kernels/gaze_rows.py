@@ -205,10 +205,12 @@ def step_down_row(row: Any, carry: Any, x: Any, y: Any, z: Any) -> None:
 
 
 @inlined_kernel
-def turn_frame_row(row: Any, at: int, carry: Any) -> None:
-    """Turn the carried frame by a rotation vector that stands in the joint's row from `at` on."""
+def turn_frame_row(row: Any, carry: Any) -> None:
+    """Turn the carried frame by the turn that is wanted of the joint."""
     for lane in range(LANES):
-        a, b, c, d = exponential(row[at + lane], row[at + LANES + lane], row[at + 2 * LANES + lane])
+        a, b, c, d = exponential(
+            row[WANTED + lane], row[WANTED + LANES + lane], row[WANTED + 2 * LANES + lane]
+        )
         w, i, j, k = product(
             carry[ROTATION + lane], carry[ROTATION + LANES + lane],
             carry[ROTATION + 2 * LANES + lane], carry[ROTATION + 3 * LANES + lane],
@@ -221,19 +223,25 @@ def turn_frame_row(row: Any, at: int, carry: Any) -> None:
 
 
 @inlined_kernel
-def missing_row(row: Any, carry: Any) -> None:
-    """Find the heading and the elevation by which the head misses the target, and the joint's part of both.
+def aim_joint_row(
+    row: Any, carry: Any, pitch: Any, heading: Any, roll: Any, bias_x: Any, bias_y: Any, bias_z: Any
+) -> None:
+    """Find a joint's part of the turn by which the head misses the target, within the joint's limits.
 
     Parameters
     ----------
     row : (JOINT_ROW,) float32
-        The joint; `WANTED` is written: heading, rise, and heading of the forward axis, rad.
+        The joint; `WANTED` is written: a rotation vector in its frame, rad.
     carry : (CARRY_ROW,) float32
         The joint's frame before its turn; target.
+    pitch, heading, roll : float32
+        Limits, rad.
+    bias_x, bias_y, bias_z : float32
+        Added, rad.
 
     Notes
     -----
-    **Differs from the source:** heading about the vertical and elevation about the horizontal, instead of the
+    **Differs from the source:** heading about the vertical and rise about the horizontal, instead of the
     shortest rotation, so that heads stay level and people turn round for what is behind them instead of
     bending over backwards.
     """
@@ -253,47 +261,19 @@ def missing_row(row: Any, carry: Any) -> None:
         tz = carry[TARGET + 2 * LANES + lane] - carry[POSITION + 2 * LANES + lane] - ez
         across = np.sqrt(tx * tx + tz * tz)
         distance = np.sqrt(across * across + ty * ty + TINY)
-        own = arc_tangent(fx, fz)
-        heading = arc_tangent(tx, tz) - own
-        heading -= TWO * PI * np.floor((heading + PI) / (TWO * PI))
+        level = np.sqrt(fx * fx + fz * fz + TINY)
+        turn = arc_tangent(fz * tx - fx * tz, fx * tx + fz * tz)
+        rise = arc_tangent(ty * level - fy * across, across * level + ty * fy)
         side = carry[SIDE + lane]
-        wrong_side = heading * side < ZERO
-        heading = heading + TWO * PI * side if abs(heading) > BEHIND and wrong_side else heading
-        heading *= min(STEEP * across / distance, ONE)
-        rise = arc_tangent(ty, across) - arc_tangent(fy, np.sqrt(fx * fx + fz * fz))
-        share = row[SHARE + lane]
-        row[WANTED + lane] = heading * share
-        row[WANTED + LANES + lane] = rise * share
-        row[WANTED + 2 * LANES + lane] = own
-
-
-@inlined_kernel
-def limit_row(
-    row: Any, carry: Any, pitch: Any, heading: Any, roll: Any, bias_x: Any, bias_y: Any, bias_z: Any
-) -> None:
-    """Turn a joint's part of heading and rise into a rotation vector in its frame, within its limits.
-
-    Parameters
-    ----------
-    row : (JOINT_ROW,) float32
-        `WANTED` from `missing_row`; overwritten with the rotation vector, rad.
-    carry : (CARRY_ROW,) float32
-        The joint's frame before its turn.
-    pitch, heading, roll : float32
-        Limits, rad.
-    bias_x, bias_y, bias_z : float32
-        Added, rad.
-    """
-    for lane in range(LANES):
-        turn = row[WANTED + lane]
-        rise = row[WANTED + LANES + lane]
-        # The axis of the rise: to the left of the heading half-way through the turn.
-        sine, cosine = sine_cosine(row[WANTED + 2 * LANES + lane] + HALF * turn)
+        wrong_side = turn * side < ZERO
+        turn = turn + TWO * PI * side if abs(turn) > BEHIND and wrong_side else turn
+        turn *= row[SHARE + lane] * min(STEEP * across / distance, ONE)
+        rise *= row[SHARE + lane] / level
+        # The axis of the rise is to the left of the heading half-way through the turn.
+        sine, cosine = sine_cosine(HALF * turn)
         x, y, z = rotated(
-            carry[ROTATION + lane], -carry[ROTATION + LANES + lane],
-            -carry[ROTATION + 2 * LANES + lane], -carry[ROTATION + 3 * LANES + lane],
-            -rise * cosine, turn, rise * sine,
-        )  # fmt: skip
+            w, -i, -j, -k, rise * (fx * sine - fz * cosine), turn, rise * (fx * cosine + fz * sine)
+        )
         factor = within_ellipse(x, y, pitch, heading)
         row[WANTED + lane] = x * factor + bias_x
         row[WANTED + LANES + lane] = y * factor + bias_y
@@ -363,22 +343,19 @@ def swing_row(row: Any, carry: Any, frequency: Any, decay: Any, dt: Any) -> None
 
 @inlined_kernel
 def settle_row(row: Any, carry: Any, most_speed: Any) -> None:
-    """Take the step of a joint, slowed down so that the head keeps its largest speed."""
+    """Take the step of a joint, slowed down so that the head keeps its largest speed, and turn the joint."""
     for lane in range(LANES):
         slow = most_speed / max(carry[SPEED + lane], most_speed)
-        row[TURN + lane] += slow * row[WANTED + lane]
-        row[TURN + LANES + lane] += slow * row[WANTED + LANES + lane]
-        row[TURN + 2 * LANES + lane] += slow * row[WANTED + 2 * LANES + lane]
+        x = row[TURN + lane] + slow * row[WANTED + lane]
+        y = row[TURN + LANES + lane] + slow * row[WANTED + LANES + lane]
+        z = row[TURN + 2 * LANES + lane] + slow * row[WANTED + 2 * LANES + lane]
+        row[TURN + lane] = x
+        row[TURN + LANES + lane] = y
+        row[TURN + 2 * LANES + lane] = z
         row[RATE + lane] *= slow
         row[RATE + LANES + lane] *= slow
         row[RATE + 2 * LANES + lane] *= slow
-
-
-@inlined_kernel
-def turn_joint_row(row: Any) -> None:
-    """Turn the local rotation of a joint by its turn."""
-    for lane in range(LANES):
-        a, b, c, d = exponential(row[TURN + lane], row[TURN + LANES + lane], row[TURN + 2 * LANES + lane])
+        a, b, c, d = exponential(x, y, z)
         w, i, j, k = product(
             row[ROTATION + lane], row[ROTATION + LANES + lane],
             row[ROTATION + 2 * LANES + lane], row[ROTATION + 3 * LANES + lane],

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels.gaze import CHARACTER, NOTHING
 from crowd_kernels.neighbors import CHUNKS, NUMBER_MASK, find_nearest
 from crowd_kernels.random import normal, uniform
 
@@ -13,7 +14,6 @@ PURPOSE_WHOM = 0x61A0
 PURPOSE_LENGTH = 0x61A1
 PURPOSE_PAUSE = 0x61A2
 PURPOSE_GLANCE_ENTRY = 0x61A3
-NOBODY = -1
 NO_LENGTH = 1e-6
 
 
@@ -96,13 +96,18 @@ def glance_crowd(
     velocity_world: Any,
     yaw: Any,
     is_active: Any,
+    may_glance: Any,
+    share: float,
     active: Any,
     seed: int,
     step: int,
     time: float,
     keys: Any,
     until: Any,
+    is_glancing: Any,
+    kind: Any,
     whom: Any,
+    trunk: Any,
 ) -> None:
     """Choose whom people glance at, and end glances that have lasted or are lost.
 
@@ -121,8 +126,12 @@ def glance_crowd(
         Heading, rad.
     is_active : (N,) bool
         The row holds somebody.
+    may_glance : (N,) bool
+        Who glances at all.
+    share : float
+        Share of the trunk in a glance, 0 to 1.
     active : (A,) int32
-        Characters who are free to glance, each once; 0 to N - 1.
+        Characters to process, each once; 0 to N - 1. Those with a gaze that is no glance are passed over.
     seed, step : int
         Keys of the draws.
     time : float
@@ -131,8 +140,14 @@ def glance_crowd(
         Scratch; C nearest people are considered.
     until : (N,) float64
         In and out: time of the next choice, s; 0 for somebody new.
+    is_glancing : (N,) bool
+        In and out: the gaze is a glance.
+    kind : (N,) uint8
+        In and out: 0 nothing, 2 a character; others are no glances.
     whom : (N,) int32
-        In and out: who is looked at, or -1.
+        In and out: who is looked at.
+    trunk : (N,) float32
+        In and out: share of the trunk.
 
     Notes
     -----
@@ -149,13 +164,16 @@ def glance_crowd(
         found_keys = keys[chunk]
         for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             character = active[index]
+            if not may_glance[character] or (kind[character] != NOTHING and not is_glancing[character]):
+                continue
             x, z = position_world[character, 0], position_world[character, 2]
-            other = whom[character]
-            if other != NOBODY:
+            if is_glancing[character]:
+                other = whom[character]
                 dx, dz = position_world[other, 0] - x, position_world[other, 2] - z
                 is_lost = not is_active[other] or bearing(dx, dz, yaw[character]) > limits.lost_field
                 if is_lost or time >= until[character]:
-                    whom[character] = NOBODY
+                    is_glancing[character] = False
+                    kind[character] = NOTHING
                     draw = normal(seed, character, step, PURPOSE_PAUSE)
                     until[character] = time + math.exp(limits.pause_log_mean + limits.pause_log_spread * draw)
                 continue
@@ -198,7 +216,10 @@ def glance_crowd(
                     yaw[character],
                 )
                 if rest < 0.0:
+                    is_glancing[character] = True
+                    kind[character] = CHARACTER
                     whom[character] = other
+                    trunk[character] = share
                     draw = normal(seed, character, step, PURPOSE_LENGTH)
                     until[character] = time + math.exp(
                         limits.length_log_mean + limits.length_log_spread * draw

@@ -18,10 +18,17 @@ class Square:
         count = len(position)
         self.position, self.velocity, self.yaw = position, velocity, yaw
         self.is_active = np.ones(count, bool)
-        self.until, self.whom = np.zeros(count), np.full(count, -1, np.int32)
+        self.until, self.index_of_other = np.zeros(count), np.full(count, -1, np.int32)
+        self.is_glancing, self.kind = np.zeros(count, bool), np.zeros(count, np.uint8)
+        self.trunk, self.may_glance = np.ones(count, np.float32), np.ones(count, bool)
         self.cells = CellTable(count, 0.25, LIMITS.distance)
         self.keys = np.zeros((CHUNKS, 8), np.int64)
         self.index = 0
+
+    @property
+    def whom(self):
+        """Who is glanced at, -1 for nobody."""
+        return np.where(self.is_glancing, self.index_of_other, -1)
 
     def step(self, dt=0.1, limits=LIMITS, seed=9):
         self.index += 1
@@ -30,8 +37,9 @@ class Square:
         cells.sort(self.position, np.full(len(self.yaw), 0.25), active, LIMITS.distance)
         glance_crowd(
             cells.cell_start, cells.point, cells.character, cells.columns, cells.rows, cells.cell_size,
-            limits, self.position, self.velocity, self.yaw, self.is_active, active, seed, self.index,
-            self.index * dt, self.keys, self.until, self.whom,
+            limits, self.position, self.velocity, self.yaw, self.is_active, self.may_glance, 0.25, active,
+            seed, self.index, self.index * dt, self.keys, self.until, self.is_glancing, self.kind,
+            self.index_of_other, self.trunk,
         )  # fmt: skip
 
 
@@ -103,3 +111,17 @@ def test_the_choice_does_not_depend_on_cells_or_company_far_away(rng):
         other.step()
     np.testing.assert_array_equal(one.whom, other.whom[:30])
     np.testing.assert_array_equal(one.until, other.until[:30])
+
+
+def test_a_wanted_gaze_is_left_alone_and_some_people_never_glance(rng):
+    square = crowd_of(rng)
+    square.kind[:10] = 1
+    square.kind[10] = 2
+    square.may_glance[11:20] = False
+    for _ in range(200):
+        square.step()
+        assert not square.is_glancing[:20].any()
+    assert square.kind[:11].tolist() == [1] * 10 + [2]
+    assert not square.kind[11:20].any()
+    assert (square.kind[20:] == np.where(square.is_glancing[20:], 2, 0)).all()
+    assert (square.trunk[20:] == 0.25).any()
