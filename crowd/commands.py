@@ -195,6 +195,11 @@ class Commands:
                 raise SettingsError(describe("look_at", "no such object", index.tolist(), known))
             gaze.look_at_object(state, rows, index, trunk)
 
+    def set_attention(self, characters: Characters, attention: str) -> None:
+        """Set how the eyes jump about what is looked at: "listening", "talking", "thinking", or "none"."""
+        simulation = self._simulation
+        simulation.gaze.set_attention(simulation.state, self._rows(characters), attention)
+
     def look_away(self, characters: Characters) -> None:
         """Let the gaze of characters fade; idle glances may come again."""
         self._simulation.gaze.release(self._simulation.state, self._rows(characters))

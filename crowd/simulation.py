@@ -111,7 +111,9 @@ class Simulation:
         self.idle = Idle(capacity)
         self.locomotion = Locomotion(capacity)
         self.animation = Animation(capacity)
-        self.gaze = Gaze(self.model.skeleton, capacity, self.navigator.avoidance, self.objects)
+        self.gaze = Gaze(
+            self.model.skeleton, capacity, self.navigator.avoidance, self.objects, self.model.placed
+        )
         self.controllers: tuple[Controller, ...] = (
             self.world_offset,
             self.idle,

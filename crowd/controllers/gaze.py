@@ -8,11 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.controllers.controller import Step
+from crowd.errors import SettingsError, describe, nearest_first
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.navigation.avoidance import Avoidance
 from crowd.navigation.cell_table import CellTable
 from crowd.people import People
-from crowd.state import Float32Array, FloatArray, IntArray, State
+from crowd.scenario import PlacedCharacters
+from crowd.state import ByteArray, Float32Array, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
 from crowd_kernels.gaze import (
     CHARACTER,
@@ -172,6 +174,7 @@ class Gaze:
         capacity: int,
         avoidance: Avoidance | None = None,
         objects: ObjectState | None = None,
+        placed: PlacedCharacters | None = None,
         settings: GazeSettings | None = None,
     ) -> None:
         """Prepare for a skeleton; neighbours come from `avoidance`, without which nobody glances."""
@@ -184,8 +187,14 @@ class Gaze:
             seen = min(self.glance_limits.distance, avoidance.settings.neighbor_distance)
             self.glance_limits = self.glance_limits._replace(distance=seen)
         self._objects = objects
+        self._look_at_world: FloatArray = np.full((capacity, 3), np.nan)
+        self._mode: ByteArray = np.zeros(capacity, np.uint8)
         self.may_glance: npt.NDArray[np.bool_] = np.full(capacity, self.settings.glances.is_on)
         """Who glances at others when nothing else is looked at. (character,)"""
+        if placed is not None:
+            self.may_glance &= placed.glances
+            self._look_at_world[:] = placed.look_at_world
+            self._mode[:] = [mode_index(attention) for attention in placed.attention]
         self._cells = None if avoidance is None else avoidance.steer_cells
         self._trunk: Float32Array = np.ones(capacity, np.float32)
         self._turned: IntArray = np.zeros(capacity, np.int32)
@@ -196,7 +205,10 @@ class Gaze:
         self.keys = np.zeros((CHUNKS, NEIGHBORS_CONSIDERED), np.int64)
 
     def activate(self, state: State, characters: IntArray) -> None:
-        """Start people looking ahead, which an empty slot already does."""
+        """Let people look where the scenario wants it, or ahead."""
+        state.saccade_mode[characters] = self._mode[characters]
+        looks = characters[np.isfinite(self._look_at_world[characters, 0])]
+        self.look_at_point(state, looks, self._look_at_world[looks])
 
     def look_at_point(
         self, state: State, characters: IntArray, point_world: npt.ArrayLike, trunk: float = 1.0
@@ -242,9 +254,9 @@ class Gaze:
         state.gaze_kind[characters] = NOTHING
         state.is_glancing[characters] = False
 
-    def set_mode(self, state: State, characters: IntArray, mode: str | None) -> None:
-        """Set the attention that saccades show, one of `MODES`; None for eyes without saccades."""
-        state.saccade_mode[characters] = OFF if mode is None else MODES.index(mode)
+    def set_attention(self, state: State, characters: IntArray, attention: str) -> None:
+        """Set how the eyes jump: "listening", "talking", "thinking", or "none"."""
+        state.saccade_mode[characters] = mode_index(attention)
 
     def _look(
         self, state: State, characters: IntArray, kind: int, index: npt.ArrayLike, trunk: float
@@ -404,6 +416,23 @@ def gaze_arrays(skeleton: Skeleton, settings: GazeSettings) -> GazeArrays:
         np.ascontiguousarray(skeleton.segment[eye], np.int32),
         int(Segment.LEG),
     )
+
+
+def mode_index(attention: str) -> int:
+    """Row of the saccade statistics.
+
+    Raises
+    ------
+    SettingsError
+        There is no such attention.
+    """
+    if attention == "none":
+        return OFF
+    if attention not in MODES:
+        raise SettingsError(
+            describe("attention", "is unknown", attention, nearest_first(attention, (*MODES, "none")))
+        )
+    return MODES.index(attention)
 
 
 def gaze_limits(settings: GazeSettings) -> GazeLimits:

@@ -91,6 +91,12 @@ class PlacedCharacters:
         Leaves the scene after the last goal.
     repeats_goals : (N,) bool
         Begins again after the last goal.
+    glances : (N,) bool
+        Looks at people who come near.
+    look_at_world : (N, 3) float64
+        Point looked at from the start, m; NaN for none.
+    attention : tuple of str
+        How the eyes jump.
     first_goal, goal_count : (N,) int64
         Range of rows of the goal arrays.
     goal_world : (G, 3) float64
@@ -119,6 +125,9 @@ class PlacedCharacters:
     is_from_flow: BoolArray
     leaves_at_goal: BoolArray
     repeats_goals: BoolArray
+    glances: BoolArray
+    look_at_world: FloatArray
+    attention: tuple[str, ...]
     first_goal: IntArray
     goal_count: IntArray
     goal_world: FloatArray
@@ -372,6 +381,11 @@ class _Builder:
             is_from_flow=np.array([person.is_from_flow for person in people], np.bool_),
             leaves_at_goal=np.array([person.leaves for person in people], np.bool_),
             repeats_goals=np.array([person.goals.repeat for person in people], np.bool_),
+            glances=np.array([person.goals.glances for person in people], np.bool_),
+            look_at_world=np.array(
+                [person.goals.look_at or (math.nan,) * 3 for person in people], np.float64
+            ).reshape(-1, 3),
+            attention=tuple(person.goals.attention for person in people),
             first_goal=first_goal,
             goal_count=goal_count,
             goal_world=goal_world,

@@ -22,6 +22,8 @@ BodyRadius = Annotated[float, Field(ge=0.1, le=2.0)]
 Speed = Annotated[float, Field(gt=0.0, le=8.0)]
 Stature = Annotated[float, Field(ge=1.0, le=2.3)]
 OnArrival = Literal["stay", "leave"]
+Attention = Literal["listening", "talking", "thinking", "none"]
+Altitude = Annotated[float, Field(ge=0.0, le=1000.0)]
 
 
 class Area(Table):
@@ -240,6 +242,12 @@ class GoalList(Table):
     character: CharacterFiles = ()
     """Skinned glTF file that they are drawn and exported as, beside the scenario; or a list, from which each
     person draws one. ``"built-in"`` is the engine's own body."""
+    glances: bool = True
+    """Now and then look at people who come near."""
+    look_at: tuple[Coordinate, Altitude, Coordinate] | None = None
+    """Point [x, y, z] that they look at from the start, m."""
+    attention: Attention = "listening"
+    """How the eyes jump about what is looked at; "none": not at all."""
     name: str | None = None
     """For messages and for `plays`."""
 

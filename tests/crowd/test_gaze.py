@@ -39,7 +39,7 @@ def pair(**options):
 def test_eyes_as_drawn_meet_a_point_also_while_walking():
     simulation = pair()
     target = np.array([2.0, 0.8, 5.0])
-    simulation.gaze.set_mode(simulation.state, np.array([0, 1], np.int32), None)
+    simulation.commands.set_attention([0, 1], "none")
     simulation.commands.look_at([0, 1], target)
     for frame in simulation.run(seconds=2.5):
         if frame.time > 1.2:
@@ -55,7 +55,7 @@ def test_eyes_as_drawn_meet_a_point_also_while_walking():
 
 def test_the_eyes_of_somebody_who_walks_past_are_followed():
     simulation = pair()
-    simulation.gaze.set_mode(simulation.state, np.array([0], np.int32), None)
+    simulation.commands.set_attention(0, "none")
     simulation.commands.look_at(0, character=1)
     skeleton = simulation.model.skeleton
     eyes = [skeleton.joint("left_eye"), skeleton.joint("right_eye")]
@@ -87,6 +87,7 @@ def test_what_cannot_be_looked_at_is_refused_by_a_status():
         (lambda c: c.look_at(0, object=0), "no objects"),
         (lambda c: c.look_at(0, object="cup"), "no object has this name"),
         (lambda c: c.look_at(0, (0, 1, 2), trunk=2), "0 to 1"),
+        (lambda c: c.set_attention(0, "talkative"), "talking"),
     ],
 )
 def test_bad_commands_get_one_clear_line(call, message):
@@ -148,3 +149,53 @@ def test_glances_can_be_switched_off_by_settings():
     simulation.controllers = (*simulation.controllers[:-1], gaze)
     for _ in simulation.run(seconds=5.0):
         assert not simulation.state.is_glancing.any()
+
+
+def test_a_scenario_tells_who_looks_where():
+    person = Character(position=(0, 0), facing=0)
+    people = (
+        person.model_copy(update={"look_at": (1.0, 1.4, 2.0)}),
+        person.model_copy(update={"position": (2, 0), "glances": False, "attention": "none"}),
+        person.model_copy(update={"position": (2, 2.5), "facing": 180.0, "attention": "talking"}),
+    )
+    simulation = crowd.Simulation(Scenario(world=GROUND, characters=people), seed=1)
+    state, glanced = simulation.state, np.zeros(3, bool)
+    for _ in simulation.run(seconds=30.0):
+        glanced |= state.is_glancing
+    assert glanced.tolist() == [False, False, True]
+    assert state.gaze_status[0] == ON_TARGET
+    np.testing.assert_array_equal(state.gaze_target_world[0], (1.0, 1.4, 2.0))
+    assert state.saccade_mode.tolist() == [0, 255, 1]
+    assert not state.saccade_offset[1].any()
+
+
+def looking(**options):
+    """A square full of people, some of whom look at points, at others, and away again."""
+    simulation = crowd.Simulation(square(), seed=2, **options)
+    simulation.commands.look_at(slice(0, 20), (0.0, 1.2, 0.0))
+    simulation.commands.look_at(np.arange(20, 40), character=np.arange(19, -1, -1))
+    return simulation
+
+
+def gaze_of(simulation):
+    return {name: getattr(simulation.state, name).copy() for name in (*Gaze.state_fields, "pose_rotation")}
+
+
+def test_equal_bits_on_two_threads_and_after_a_stop(tmp_path):
+    one, two = looking(is_threaded=False), looking(threads=2, is_threaded=True)
+    for simulation in (one, two):
+        for frame in simulation.run(seconds=3.0):
+            if abs(frame.time - 1.5) < 1e-6:
+                simulation.save(tmp_path / "stop.npz")
+            if abs(frame.time - 2.0) < 1e-6:
+                simulation.commands.look_away(slice(0, 10))
+    other = looking(is_threaded=False)
+    other.restore(tmp_path / "stop.npz")
+    for frame in other.run(seconds=1.5):
+        if abs(frame.time - 2.0) < 1e-6:
+            other.commands.look_away(slice(0, 10))
+    wanted = gaze_of(one)
+    assert (wanted["gaze_status"] > 0).sum() > 30
+    for simulation in (two, other):
+        for name, array in gaze_of(simulation).items():
+            np.testing.assert_array_equal(array, wanted[name], err_msg=name)

@@ -10,7 +10,7 @@ import numba
 import pytest
 from llvmlite import binding
 
-from crowd_kernels import _jit, clip, lanes, pose
+from crowd_kernels import _jit, clip, gaze_rows, lanes, pose
 
 FEATURES = binding.get_host_cpu_features()
 ROW = numba.float32[::1]
@@ -34,6 +34,16 @@ ARITHMETIC_LEAVES = {
     clip.normalize_row: (ROW, ROW),
     clip.mix_row: (ROW, NUMBER, ROW, ROW),
     pose.child_row: (ROW, ROW, ROW, ROW, NUMBER, NUMBER, NUMBER, ROW, ROW),
+    gaze_rows.look_back_row: (ROW, ROW, *[NUMBER] * 4, numba.boolean, ROW),
+    gaze_rows.begin_row: (ROW, ROW, *[NUMBER] * 3),
+    gaze_rows.step_down_row: (ROW, ROW, *[NUMBER] * 3),
+    gaze_rows.aim_joint_row: (ROW, ROW, *[NUMBER] * 6),
+    gaze_rows.turn_frame_row: (ROW, ROW),
+    gaze_rows.excess_row: (*[NUMBER] * 3, ROW, NUMBER, NUMBER, ROW),
+    gaze_rows.swing_row: (ROW, ROW, *[NUMBER] * 3),
+    gaze_rows.settle_row: (ROW, ROW, NUMBER),
+    gaze_rows.aim_eye_row: (ROW, ROW, *[NUMBER] * 6),
+    gaze_rows.turn_eye_row: (ROW, NUMBER, NUMBER),
 }
 SHUFFLE_LEAVES = {
     lanes.interleave: (ROW, ROW, ROW, ROW, INTEGER, ROW),
