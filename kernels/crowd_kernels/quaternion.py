@@ -160,6 +160,34 @@ def between(a: Vector, b: Vector) -> Quaternion:
 
 
 @kernel
+def from_axes(x: Vector, y: Vector, z: Vector) -> Quaternion:
+    """Find the rotation that takes the coordinate axes to three others.
+
+    Parameters
+    ----------
+    x, y, z : tuple of float
+        Unit vectors, right-handed and perpendicular to each other.
+
+    Returns
+    -------
+    tuple of float
+        Unit quaternion.
+
+    Notes
+    -----
+    **Source:** Shepperd, "Quaternion from rotation matrix", 1978: the largest component is found first.
+    """
+    trace = x[0] + y[1] + z[2]
+    if trace >= max(x[0], y[1], z[2]):
+        return normalized((1.0 + trace, y[2] - z[1], z[0] - x[2], x[1] - y[0]))
+    if x[0] >= max(y[1], z[2]):
+        return normalized((y[2] - z[1], 1.0 + 2.0 * x[0] - trace, x[1] + y[0], z[0] + x[2]))
+    if y[1] >= z[2]:
+        return normalized((z[0] - x[2], x[1] + y[0], 1.0 + 2.0 * y[1] - trace, y[2] + z[1]))
+    return normalized((x[1] - y[0], z[0] + x[2], y[2] + z[1], 1.0 + 2.0 * z[2] - trace))
+
+
+@kernel
 def nlerp(a: Quaternion, b: Quaternion, weight: float) -> Quaternion:
     """Mix two rotations the short way along a chord: `a` at weight 0, `b` at 1.
 
