@@ -324,7 +324,7 @@ def hair(flesh: Flesh, outfit: Outfit, points: Points) -> Values:
     middle = np.array([0.0, 1.585, 0.0], np.float32)
     q = (points - middle) / size + middle
     p = mirrored(q)
-    thick = {"crop": 0.006, "short": 0.014, "curls": 0.034}.get(kind, 0.017)
+    thick = {"crop": 0.006, "short": 0.012, "curls": 0.034}.get(kind, 0.015)
     skull = joined(
         [
             (ellipsoid(p, (0, 1.668, -0.006), (0.0745 + thick, 0.084 + thick, 0.098 + thick)), 0),
@@ -335,7 +335,7 @@ def hair(flesh: Flesh, outfit: Outfit, points: Points) -> Values:
     front, rise = (1.708, 0.95) if kind != "curls" else (1.700, 0.9)
     line = (front - rise * (0.085 - p[:, 2])) - p[:, 1]
     line = np.where(p[:, 2] > 0.045, line + 0.9 * np.maximum(p[:, 0] - 0.045, 0.0), line)
-    value = cut(skull, (0.72 * line).astype(np.float32), 0.012)
+    value = cut(skull, (0.72 * line).astype(np.float32), 0.018)
     if kind in ("short", "crop"):
         lift = ellipsoid(p, (0, 1.722, 0.058), (0.052, 0.026 + 0.6 * thick, 0.040))
         value = join(value, lift, 0.03)
@@ -411,8 +411,10 @@ def bag(flesh: Flesh, outfit: Outfit, points: Points) -> Values:
         back = float(figure.trunk_rings[7, 2]) + 0.008 + slack
         body = rounded_box(points, (0, 1.235, -back - 0.075), (0.135, 0.205, 0.075), 0.055)
         body = join(body, rounded_box(points, (0, 1.15, -back - 0.140), (0.105, 0.10, 0.030), 0.028), 0.015)
-        strap = np.maximum(np.abs(np.abs(points[:, 0]) - 0.088) - 0.022, np.abs(trunk) - 0.011)
-        strap = np.maximum(strap, 1.17 - points[:, 1])
+        # Over the shoulders, in front outwards to below the arms.
+        middle = 0.085 + np.where(points[:, 2] > -0.02, 0.40 * np.maximum(1.36 - points[:, 1], 0.0), 0.0)
+        strap = np.maximum(np.abs(np.abs(points[:, 0]) - middle) - 0.022, np.abs(trunk) - 0.011)
+        strap = np.maximum(strap, np.maximum(1.17 - points[:, 1], points[:, 1] - 1.505))
         return join(body, strap.astype(np.float32), 0.01)
     body = rounded_box(points, (0.235, 0.875, -0.02), (0.045, 0.105, 0.135), 0.035)
     across = np.abs(0.80 * points[:, 0] + 0.60 * (points[:, 1] - 1.20)) - 0.018

@@ -20,6 +20,8 @@ Triangles = npt.NDArray[np.int64]
 
 LEVEL_VERTICES = (4600, 1000, 260)
 LEAST_VERTICES = (40, 30, 30)
+SKY_REACH, SKY_SHARE = (0.015, 0.04, 0.09, 0.18), (0.22, 0.22, 0.22, 0.22)
+"""How far from the surface the distance is looked up, m, and how much each counts."""
 
 
 def sampled_surface(piece: Piece) -> tuple[FloatArray, Triangles]:
@@ -62,7 +64,8 @@ def paired(vertices: FloatArray, triangles: Triangles) -> tuple[FloatArray, Tria
 def normals_of(piece: Piece, vertices: FloatArray) -> FloatArray:
     """Directions in which the distance grows."""
     points = vertices.astype(np.float32)
-    half = np.float32(0.5 * piece.step)
+    # Wider than the samples are apart: small dents would glitter.
+    half = np.float32(piece.step)
     gradient = np.stack(
         [
             piece.distance(points + half * axis) - piece.distance(points - half * axis)
@@ -71,6 +74,26 @@ def normals_of(piece: Piece, vertices: FloatArray) -> FloatArray:
         axis=1,
     ).astype(np.float64)
     return np.asarray(gradient / np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 1e-9))
+
+
+def open_sky(everything: Sequence[Piece], vertices: FloatArray, normals: FloatArray) -> FloatArray:
+    """Share of the light from around that reaches vertices, from how fast the distance to the body grows.
+
+    Notes
+    -----
+    **Source:** ambient occlusion from distance fields (Evans, "Fast approximations for global illumination on
+    dynamic scenes", 2006).
+    """
+    hidden = np.zeros(len(vertices))
+    for reach, share in zip(SKY_REACH, SKY_SHARE, strict=True):
+        outside = (vertices + reach * normals).astype(np.float32)
+        distance = np.full(len(vertices), reach, np.float32)
+        for piece in everything:
+            distance = np.minimum(distance, piece.distance(outside))
+            if piece.is_paired:
+                distance = np.minimum(distance, piece.distance(outside * np.array([-1, 1, 1], np.float32)))
+        hidden += share * np.clip(1.0 - distance / reach, 0.0, 1.0)
+    return np.asarray(1.0 - hidden)
 
 
 def generate(recipe: Recipe, stance: Stance) -> tuple[Skin, ...]:
@@ -89,23 +112,27 @@ def generate(recipe: Recipe, stance: Stance) -> tuple[Skin, ...]:
                 if piece.is_paired
                 else simplified(*surface, wanted)
             )
-            parts.append(_skinned(flesh, piece, *mesh))
+            parts.append(_skinned(flesh, everything, piece, *mesh))
         skins.append(assembled(parts))
     return tuple(skins)
 
 
-def _skinned(flesh: Flesh, piece: Piece, vertices: FloatArray, triangles: Triangles) -> Skin:
+def _skinned(
+    flesh: Flesh, everything: Sequence[Piece], piece: Piece, vertices: FloatArray, triangles: Triangles
+) -> Skin:
     """A piece in rest pose with weights."""
     joint, weight = strongest(
         skin_weights(flesh, vertices.astype(np.float32), piece.legs_apart, has_limbs=piece.has_limbs)
     )
-    position, normal = at_rest(flesh.stance, vertices, normals_of(piece, vertices), joint, weight)
+    facing = normals_of(piece, vertices)
+    position, normal = at_rest(flesh.stance, vertices, facing, joint, weight)
     return Skin(
         position.astype(np.float32),
         normal.astype(np.float32),
         joint,
         weight.astype(np.float32),
         np.full(len(vertices), int(piece.material), np.uint8),
+        open_sky(everything, vertices, facing).astype(np.float32),
         triangles.astype(np.uint32),
     )
 
@@ -123,6 +150,7 @@ def assembled(parts: Sequence[Skin]) -> Skin:
         all_of("joint"),
         all_of("weight"),
         all_of("material"),
+        all_of("open_sky"),
         np.concatenate([part.triangle + np.uint32(begin) for part, begin in zip(parts, first, strict=True)]),
     )
 

@@ -15,6 +15,7 @@ Float32Array = npt.NDArray[np.float32]
 LEVELS = 3
 """Skins of a build: for people near, at some distance, and far away."""
 STEPS_PER_METRE = 10_000.0
+SKY_STEPS = 63.0
 FIRST_OF_TIMES = (1980, 1, 1, 0, 0, 0)
 """Date of everything in the file: the same skins are the same bytes."""
 
@@ -32,6 +33,8 @@ class Skin:
         Share of each joint; they add up to 1.
     material : (V,) uint8
         `Material`; the same at all corners of a triangle.
+    open_sky : (V,) float32
+        Share of the light from all around that the body itself does not keep away, 0 to 1.
     triangle : (T, 3) uint32
         Anticlockwise from outside.
     """
@@ -41,6 +44,7 @@ class Skin:
     joint: npt.NDArray[np.uint8]
     weight: Float32Array
     material: npt.NDArray[np.uint8]
+    open_sky: Float32Array
     triangle: npt.NDArray[np.uint32]
 
 
@@ -59,6 +63,7 @@ def write_skins(path: Path, builds: Iterable[tuple[Skin, ...]]) -> None:
         "joint": np.where(weight > 0, np.concatenate([s.joint for s in skins]), 0).astype(np.uint8).T,
         "weight": weight.T,
         "material": np.concatenate([s.material for s in skins]),
+        "open_sky": np.round(np.concatenate([s.open_sky for s in skins]) * SKY_STEPS).astype(np.uint8),
         "triangle": np.concatenate([s.triangle for s in skins]).astype(np.uint16).T,
     }
     with zipfile.ZipFile(path, "w") as archive:
@@ -81,7 +86,7 @@ def read_skins(path: Path) -> tuple[tuple[Skin, ...], ...]:
     with np.load(path) as file:
         columns = {name: file[name] for name in file.files}
     ends = np.cumsum(columns["vertex_count"])[:-1]
-    names = ("position", "normal", "joint", "weight", "material")
+    names = ("position", "normal", "joint", "weight", "material", "open_sky")
     parts = {name: np.split(np.ascontiguousarray(columns[name].T), ends) for name in names}
     triangles = np.split(columns["triangle"].T, np.cumsum(columns["triangle_count"])[:-1])
     skins = [
@@ -91,9 +96,10 @@ def read_skins(path: Path) -> tuple[tuple[Skin, ...], ...]:
             joint,
             (weight / 255.0).astype(np.float32),
             material,
+            (open_sky / SKY_STEPS).astype(np.float32),
             triangle.astype(np.uint32),
         )
-        for position, normal, joint, weight, material, triangle in zip(
+        for position, normal, joint, weight, material, open_sky, triangle in zip(
             *(parts[name] for name in names), triangles, strict=True
         )
     ]

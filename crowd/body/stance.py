@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.body.distances import Points
-from crowd.motion.skeleton import Skeleton
+from crowd.motion.skeleton import Segment, Skeleton
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -95,11 +95,33 @@ class Stance:
 
 def rest_positions(skeleton: Skeleton) -> FloatArray:
     """Joints in rest pose, m. (J, 3)."""
-    rest = skeleton.offset.copy()
+    return summed_offsets(skeleton.offset, skeleton)
+
+
+def summed_offsets(offset: FloatArray, skeleton: Skeleton) -> FloatArray:
+    """Joints whose offsets from their parents are given, with nothing turned. (J, 3)."""
+    rest = np.array(offset, np.float64)
     for joint, parent in enumerate(skeleton.parent):
         if parent >= 0:
             rest[joint] += rest[parent]
     return rest
+
+
+def flesh_segments(skeleton: Skeleton) -> npt.NDArray[np.int32]:
+    """Segment whose scale stretches the flesh around each joint: that of the bone below it. (J,)."""
+    segment = np.array(skeleton.segment, np.int32)
+    for name, part in (("pelvis", Segment.PELVIS), ("clavicle", Segment.SHOULDER), ("hand", Segment.HAND)):
+        segment[[name in joint for joint in skeleton.joint_names]] = int(part)
+    for joint, name in enumerate(skeleton.joint_names):
+        if name.endswith("upper_arm"):
+            segment[joint] = int(Segment.ARM)
+        elif name.endswith("thigh"):
+            segment[joint] = int(Segment.LEG)
+        elif name.endswith("foot"):
+            segment[joint] = int(Segment.FOOT)
+        elif name == "spine_4":
+            segment[joint] = int(Segment.TORSO)
+    return segment
 
 
 def turn_about(centre: FloatArray, axis: int, angle: float) -> FloatArray:

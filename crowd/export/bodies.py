@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from crowd.body import Skin, built_in_builds
+from crowd.body.builds import is_built_in
+from crowd.body.looks import draw_builds, draw_looks
+from crowd.body.stance import flesh_segments, rest_positions, summed_offsets
 from crowd.characters import Character, Driver, MeshPart
 from crowd.motion.rotation import conjugate, multiply, rotate
 from crowd.motion.skeleton import Skeleton
@@ -40,24 +44,28 @@ class Tracks:
     scale: float
 
 
-class StickBody:
-    """The project's own skeleton, drawn as sticks.
+class OwnBody:
+    """The project's own skeleton with meshes around it.
 
     Parameters
     ----------
+    name : str
     skeleton : Skeleton
+    rest : (J, 3) float64
+        Joints in rest pose, m.
+    parts : tuple of MeshPart
+        In rest pose.
     """
 
-    name = "sticks"
-
-    def __init__(self, skeleton: Skeleton) -> None:
+    def __init__(self, name: str, skeleton: Skeleton, rest: FloatArray, parts: tuple[MeshPart, ...]) -> None:
+        self.name = name
         self.joint_names = skeleton.joint_names
         self.parent: IntArray = skeleton.parent
-        self.rest: FloatArray = _rest_positions(skeleton)
+        self.rest: FloatArray = rest
         self.rest_rotation: FloatArray = np.tile([1.0, 0.0, 0.0, 0.0], (skeleton.joint_count, 1))
         self.inverse_bind: FloatArray = np.tile(np.eye(4), (skeleton.joint_count, 1, 1))
         self.inverse_bind[:, :3, 3] = -self.rest
-        self.parts = (stick_mesh(skeleton, self.rest),)
+        self.parts = parts
 
     def tracks(self, recording: Recording, poses: Poses, slot: int) -> Tracks:
         """Transforms of one person, whose poses are (F, 1, ...)."""
@@ -103,7 +111,7 @@ class CharacterBody:
         return Tracks(rotation, translation, size)
 
 
-Body = StickBody | CharacterBody
+Body = OwnBody | CharacterBody
 
 
 class Bodies:
@@ -112,40 +120,79 @@ class Bodies:
     Parameters
     ----------
     recording : Recording
-        Its people keep the characters that they were recorded with; others are sticks.
+        Its people keep the characters that they were recorded with; others get built-in bodies, or sticks
+        where the skeleton is not the built-in one.
     characters : sequence of Character
         Given to people in turn by slot instead.
     """
 
     def __init__(self, recording: Recording, characters: Sequence[Character] = ()) -> None:
-        cast = recording.cast
+        cast, skeleton = recording.cast, recording.skeleton
         self._number = np.arange(recording.character_count) % len(characters) if characters else cast.number
         self._characters = tuple(characters) or cast.characters
-        self._skeleton = recording.skeleton
+        self._skeleton = skeleton
+        self._recording = recording
+        self._builds = built_in_builds() if is_built_in(skeleton) else ()
+        if self._builds:
+            recipes = [build.recipe for build in self._builds]
+            slots = np.arange(recording.character_count)
+            self._build = draw_builds(slots, recording.stature, recipes)
+            self._look = draw_looks(slots, self._build, recipes)
         self._made: dict[int, Body] = {}
 
-    def number(self, slot: int) -> int:
-        """Which body a person has; -1 for sticks."""
-        return int(self._number[slot])
+    def kind(self, slot: int) -> str:
+        """Name that those who have the same body share, whatever its colours."""
+        number = int(self._number[slot])
+        if number >= 0:
+            return f"body_{number}"
+        return f"build_{self._build[slot]}" if self._builds else "sticks"
 
     def of(self, slot: int) -> Body:
         """The body of a person."""
-        number = self.number(slot)
-        if number not in self._made:
-            self._made[number] = (
-                StickBody(self._skeleton)
-                if number < 0
-                else CharacterBody(self._characters[number], self._skeleton)
+        number = int(self._number[slot])
+        key = number if number >= 0 else -1 - slot
+        if key not in self._made:
+            self._made[key] = (
+                CharacterBody(self._characters[number], self._skeleton) if number >= 0 else self._own(slot)
             )
-        return self._made[number]
+        return self._made[key]
+
+    def _own(self, slot: int) -> OwnBody:
+        """A body in the person's own proportions."""
+        skeleton, recording = self._skeleton, self._recording
+        plain = rest_positions(skeleton)
+        if not self._builds:
+            return OwnBody("sticks", skeleton, plain, (stick_mesh(skeleton, plain),))
+        build = self._builds[self._build[slot]]
+        rest = summed_offsets(recording.joint_offsets(np.array([slot]))[0], skeleton)
+        flesh = recording.segment_scale[slot, flesh_segments(skeleton)].astype(np.float64)
+        skin = build.skins[0]
+        around = skin.position[:, None] - plain[skin.joint]
+        moved = rest[skin.joint] + flesh[skin.joint][..., None] * around
+        position = np.einsum("vk,vki->vi", skin.weight, moved).astype(np.float32)
+        parts = skin_parts(replace(skin, position=position), self._look[slot, :, :3])
+        return OwnBody(build.recipe.name, skeleton, rest, parts)
 
 
-def _rest_positions(skeleton: Skeleton) -> FloatArray:
-    rest = skeleton.offset.copy()
-    for joint, parent in enumerate(skeleton.parent):
-        if parent >= 0:
-            rest[joint] += rest[parent]
-    return rest
+def skin_parts(skin: Skin, colours: Float32Array) -> tuple[MeshPart, ...]:
+    """A mesh for each material of a skin; row k of the colours (M, 3), linear, is that of material k."""
+    parts = []
+    of_triangle = skin.material[skin.triangle[:, 0]]
+    for material in np.unique(of_triangle):
+        used, corner = np.unique(skin.triangle[of_triangle == material], return_inverse=True)
+        parts.append(
+            MeshPart(
+                skin.position[used],
+                skin.normal[used],
+                np.zeros((len(used), 2), np.float32),
+                skin.joint[used].astype(np.int32),
+                skin.weight[used],
+                corner.reshape(-1, 3).astype(np.int32),
+                np.append(colours[material], 1.0).astype(np.float32),
+                b"",
+            )
+        )
+    return tuple(parts)
 
 
 def stick_mesh(skeleton: Skeleton, rest: FloatArray) -> MeshPart:

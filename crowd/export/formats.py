@@ -31,7 +31,7 @@ class ExportSettings:
     ----------
     characters : sequence of Character
         Skinned characters for glTF and USD, given to people in turn; when empty, people keep those that they
-        were recorded with, and the others are sticks.
+        were recorded with, and the others get built-in bodies.
     camera : PictureCamera
         For COCO.
     """

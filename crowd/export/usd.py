@@ -53,7 +53,7 @@ def export_usd(selection: Selection, out: Path, on_block: Callable[[float], None
         stage.SetEndTimeCode(selection.frame_count - 1)
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Crowd").GetPrim())
         stage.CreateClassPrim("/Bodies")
-        for slot in {bodies.number(visit.slot): visit.slot for visit in selection.visits}.values():
+        for slot in {bodies.kind(visit.slot): visit.slot for visit in selection.visits}.values():
             _prototype(stage, bodies.of(slot), place_of(bodies, slot))
         people = [_instance(stage, visit, place_of(bodies, visit.slot)) for visit in selection.visits]
         for block in selection.blocks(1):
@@ -68,8 +68,7 @@ def export_usd(selection: Selection, out: Path, on_block: Callable[[float], None
 
 def place_of(bodies: Bodies, slot: int) -> str:
     """Where the body of a person stands in the stage."""
-    number = bodies.number(slot)
-    return "/Bodies/sticks" if number < 0 else f"/Bodies/body_{number}"
+    return f"/Bodies/{bodies.kind(slot)}"
 
 
 def _prototype(stage: Any, body: Body, place: str) -> None:

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import crowd
+from crowd.body import built_in_builds
+from crowd.body.looks import draw_builds, draw_looks
 from crowd.characters import load_character
 from crowd.errors import RecordingError, SettingsError
 from crowd.export import FORMATS, Selection, export
@@ -275,6 +277,23 @@ def test_memory_does_not_grow_with_length(corridor, tmp_path, monkeypatch, forma
 
     peak(5.0)
     assert peak(20.0) < 1.35 * peak(5.0) + 300_000
+
+
+def test_people_are_exported_with_the_bodies_that_are_drawn(plaza, tmp_path):
+    recipes = [build.recipe for build in built_in_builds()]
+    build = draw_builds(np.arange(6), plaza.stature, recipes)
+    look = draw_looks(np.arange(6), build, recipes)
+    export(Selection(plaza), "gltf", tmp_path / "people")
+    for slot in range(6):
+        person = load_character(tmp_path / "people" / f"person_{slot:04d}.glb")
+        skin = built_in_builds()[build[slot]].skins[0]
+        assert person.vertex_count == len(skin.position)
+        # The bind pose is the person's own: as tall as it is, and on the ground.
+        height = np.concatenate([part.position[:, 1] for part in person.parts])
+        assert height.max() == pytest.approx(plaza.stature[slot], rel=0.04)
+        assert abs(height.min()) < 0.01
+        for part, material in zip(person.parts, np.unique(skin.material), strict=True):
+            assert part.colour[:3] == pytest.approx(look[slot, material, :3], abs=1e-5)
 
 
 @pytest.mark.skipif(not ROBOT.is_file(), reason="needs the characters of ../shared/data")

@@ -54,7 +54,7 @@ def test_someone_covers_about_as_many_pixels_as_a_person_does(drawing, walkers, 
 
 def test_two_hundred_people_differ_in_their_looks(drawing):
     from crowd.body import built_in_builds
-    from crowd_viewer.looks import draw_builds, draw_looks
+    from crowd.body.looks import draw_builds, draw_looks
 
     recipes = [build.recipe for build in built_in_builds()]
     identity, stature = np.arange(200), np.full(200, 1.70)
@@ -69,7 +69,7 @@ def test_two_hundred_people_differ_in_their_looks(drawing):
 
 def test_tall_people_are_more_often_men(drawing):
     from crowd.body import built_in_builds
-    from crowd_viewer.looks import draw_builds
+    from crowd.body.looks import draw_builds
 
     recipes = [build.recipe for build in built_in_builds()]
     is_woman = np.array([recipe.is_woman for recipe in recipes])

@@ -41,5 +41,6 @@ def tube_mesh(limbs, around):
         joints,
         weights,
         np.full(count, Material.TOP, np.uint8),
+        np.ones(count, np.float32),
         np.concatenate(triangle).astype(np.uint32),
     )

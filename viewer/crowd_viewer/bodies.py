@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from crowd.body import Figure, Material, Outfit, Recipe, Skin, built_in_builds
 from crowd.body.builds import is_built_in
-from crowd.motion.skeleton import Segment, Skeleton
+from crowd.body.stance import rest_positions
+from crowd.motion.skeleton import Skeleton
 
 Float32Array = npt.NDArray[np.float32]
 FloatArray = npt.NDArray[np.float64]
@@ -70,14 +71,6 @@ def built_in_bodies(skeleton: Skeleton) -> tuple[Body, ...]:
     )
 
 
-def rest_positions(skeleton: Skeleton) -> FloatArray:
-    """Joints in rest pose, m. (J, 3)."""
-    rest = np.zeros((skeleton.joint_count, 3))
-    for joint, parent in enumerate(skeleton.parent):
-        rest[joint] = skeleton.offset[joint] + (rest[parent] if parent >= 0 else 0.0)
-    return rest
-
-
 def joint_parts(skeleton: Skeleton) -> npt.NDArray[np.int32]:
     """Whether the flesh of each joint is trunk and leg, arm, or hand. (J,)."""
     arms = {"upper_arm", "forearm"}
@@ -91,23 +84,6 @@ def joint_parts(skeleton: Skeleton) -> npt.NDArray[np.int32]:
             elif rest.split("_")[0] in hands:
                 part[joint] = HAND
     return part
-
-
-def flesh_segments(skeleton: Skeleton) -> npt.NDArray[np.int32]:
-    """Segment whose scale stretches the flesh around each joint: that of the bone below it. (J,)."""
-    segment = np.array(skeleton.segment, np.int32)
-    for name, part in (("pelvis", Segment.PELVIS), ("clavicle", Segment.SHOULDER), ("hand", Segment.HAND)):
-        segment[[name in joint for joint in skeleton.joint_names]] = int(part)
-    for joint, name in enumerate(skeleton.joint_names):
-        if name.endswith("upper_arm"):
-            segment[joint] = int(Segment.ARM)
-        elif name.endswith("thigh"):
-            segment[joint] = int(Segment.LEG)
-        elif name.endswith("foot"):
-            segment[joint] = int(Segment.FOOT)
-        elif name == "spine_4":
-            segment[joint] = int(Segment.TORSO)
-    return segment
 
 
 def simple_limbs(skeleton: Skeleton) -> Limbs:

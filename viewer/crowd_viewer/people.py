@@ -8,20 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.body import Skin
+from crowd.body.looks import LOOK_COLUMNS, draw_builds, draw_looks
+from crowd.body.stance import flesh_segments, rest_positions
 from crowd_kernels.view import REACH, levels_crowd, pack_crowd, sort_rows
 from crowd_viewer.bodies import (
     BY_PLACE,
     FIXED_MATERIAL,
     Body,
     built_in_bodies,
-    flesh_segments,
     joint_parts,
     landmarks,
-    rest_positions,
     worn_where,
 )
 from crowd_viewer.frame import CrowdFrame, Scene
-from crowd_viewer.looks import LOOK_COLUMNS, draw_builds, draw_looks
 from crowd_viewer.programs import MOST_JOINTS, compile_program
 from crowd_viewer.quality import Quality
 from crowd_viewer.tables import Table
@@ -353,6 +352,7 @@ VERTEX_LAYOUT = (
     ("4u1", 4, "joint"),
     ("4f4", 16, "weight"),
     ("1f4", 4, "material"),
+    ("1f4", 4, "open_sky"),
 )
 
 
@@ -366,6 +366,7 @@ def vertex_bytes(skin: Skin) -> bytes:
             ("joint", "u1", 4),
             ("weight", "f4", 4),
             ("material", "f4"),
+            ("open_sky", "f4"),
         ],
     )
     for _, _, name in VERTEX_LAYOUT:

@@ -13,24 +13,66 @@ vec4 look(int slot, int column) {
 
 const int SKIN = 0, TOP = 1, BOTTOM = 2, HAIR = 3, SHOE = 4, EXTRA = 5;
 
+uint mixed(uint x) {
+    x ^= x >> 16; x *= 0x7feb352dU; x ^= x >> 15; x *= 0x846ca68bU; x ^= x >> 16;
+    return x;
+}
+
+float lattice(ivec3 cell) {
+    uint key = uint(cell.x) * 0x9e3779b9U ^ mixed(uint(cell.y) * 0x85ebca6bU ^ mixed(uint(cell.z)));
+    return float(mixed(key)) / 4294967295.0;
+}
+
+float noise(vec3 at) {
+    ivec3 cell = ivec3(floor(at));
+    vec3 part = fract(at);
+    part = part * part * (3.0 - 2.0 * part);
+    vec4 near = vec4(lattice(cell), lattice(cell + ivec3(1, 0, 0)), lattice(cell + ivec3(0, 1, 0)), lattice(cell + ivec3(1, 1, 0)));
+    vec4 far = vec4(lattice(cell + ivec3(0, 0, 1)), lattice(cell + ivec3(1, 0, 1)), lattice(cell + ivec3(0, 1, 1)), lattice(cell + ivec3(1, 1, 1)));
+    vec4 between = mix(near, far, part.z);
+    vec2 row = mix(between.xz, between.yw, part.x);
+    return mix(row.x, row.y, part.y);
+}
+
+// Height of folds and strands above the smooth skin, m.
+float relief(int slot, int piece, vec3 at) {
+    vec3 shifted = at + float(slot % 97) * 0.37;
+    if (piece == TOP) {
+        // Folds run around the trunk and up to the shoulders.
+        return 0.010 * noise(vec3(shifted.x * 7.0, shifted.y * 17.0 + 5.0 * abs(at.x), shifted.z * 7.0));
+    }
+    if (piece == BOTTOM) return 0.008 * noise(vec3(shifted.x * 9.0, shifted.y * 16.0 + 6.0 * at.z, shifted.z * 9.0));
+    if (piece == HAIR) {
+        float around = atan(at.x, at.z - HEAD_MIDDLE + 0.02);
+        return 0.0017 * noise(vec3(around * 22.0, shifted.y * 9.0, length(at.xz) * 120.0));
+    }
+    return 0.0;
+}
+
 Material face(vec4 skin, vec3 hair, vec3 at, float pixel) {
     vec3 colour = skin.rgb;
     float side = abs(at.x), ahead = at.z - HEAD_MIDDLE;
-    if (at.y > CHIN && ahead > 0.045) {
-        float cheek = length(vec2(side - 0.040, at.y - EYES + 0.036)) / 0.030;
-        colour = mix(colour, colour * vec3(1.05, 0.80, 0.76), 0.5 * exp(-cheek * cheek));
-        vec2 eye = vec2(side - 0.0315, at.y - EYES - 0.0005);
-        float open = length(eye * vec2(1.0, 1.9));
-        float white = 1.0 - smoothstep(0.0125, 0.0135 + pixel, open);
-        colour = mix(colour, vec3(0.62, 0.60, 0.57), 0.85 * white);
-        colour = mix(colour, vec3(0.035, 0.022, 0.016), white * (1.0 - smoothstep(0.0050, 0.0060 + pixel, length(eye))));
-        float lid = abs(open - 0.0135) + max(-eye.y, 0.0) * 0.6;
-        colour = mix(colour, vec3(0.05, 0.03, 0.025), 0.75 * (1.0 - smoothstep(0.0012, 0.0030 + pixel, lid)));
-        float brow = length(vec2((side - 0.034) * 0.42, (at.y - EYES - 0.0195 + 6.0 * (side - 0.03) * (side - 0.03)) * 2.2));
-        colour = mix(colour, hair * 0.7 + 0.1 * skin.rgb, 0.85 * (1.0 - smoothstep(0.007, 0.009 + pixel, brow)));
+    if (at.y > CHIN && ahead > 0.0) {
+        // Beard: below a line from the ear to the upper lip, around the mouth.
         float lips = length(vec2(side * 0.40, at.y - MOUTH));
-        colour = mix(colour, skin.rgb * vec3(0.80, 0.48, 0.46), 0.85 * (1.0 - smoothstep(0.0075, 0.0105 + pixel, lips)));
-        colour *= 1.0 - 0.5 * (1.0 - smoothstep(0.0008, 0.0025 + pixel, abs(at.y - MOUTH) + max(side - 0.020, 0.0)));
+        float jaw = smoothstep(0.006, -0.006, at.y - (MOUTH + 0.012 + 0.35 * max(0.060 - ahead, 0.0)));
+        colour = mix(colour, mix(colour, hair * 0.8, 0.8), skin.w * jaw * smoothstep(0.0, 0.025, ahead) * smoothstep(CHIN - 0.006, CHIN + 0.006, at.y) * smoothstep(0.010, 0.014, lips));
+        if (ahead > 0.045) {
+            float cheek = length(vec2(side - 0.040, at.y - EYES + 0.036)) / 0.030;
+            colour = mix(colour, colour * vec3(1.05, 0.82, 0.78), 0.5 * exp(-cheek * cheek));
+            vec2 eye = vec2(side - 0.0315, at.y - EYES - 0.0005);
+            float open = length(vec2(eye.x, eye.y * (eye.y > 0.0 ? 2.5 : 2.1)));
+            float white = 1.0 - smoothstep(0.0125, 0.0135 + pixel, open);
+            colour = mix(colour, vec3(0.50, 0.47, 0.45), 0.85 * white);
+            vec3 iris = mix(vec3(0.035, 0.020, 0.013), vec3(0.10, 0.13, 0.15), step(0.35, skin.r) * step(0.12, hair.r));
+            colour = mix(colour, iris, white * (1.0 - smoothstep(0.0052, 0.0062 + pixel, length(eye))));
+            float lid = abs(open - 0.0135) + max(-eye.y, 0.0) * 0.6;
+            colour = mix(colour, vec3(0.05, 0.03, 0.025), 0.8 * (1.0 - smoothstep(0.0014, 0.0032 + pixel, lid)));
+            float brow = length(vec2((side - 0.034) * 0.42, (at.y - EYES - 0.0185 + 6.0 * (side - 0.03) * (side - 0.03)) * 2.2));
+            colour = mix(colour, hair * 0.7 + 0.1 * skin.rgb, 0.85 * (1.0 - smoothstep(0.0065, 0.009 + pixel, brow)));
+            colour = mix(colour, skin.rgb * vec3(0.80, 0.52, 0.50), 0.65 * (1.0 - smoothstep(0.0070, 0.0105 + pixel, lips)));
+            colour *= 1.0 - 0.5 * (1.0 - smoothstep(0.0008, 0.0025 + pixel, abs(at.y - MOUTH) + max(side - 0.020, 0.0)));
+        }
     }
     return Material(colour, 0.06);
 }
@@ -44,8 +86,8 @@ Material top_cloth(int slot, vec3 at, float pixel) {
     if (pattern == 1) cloth = mix(cloth, accent.rgb, smoothstep(0.5 - 4.0 * pixel * cut.z, 0.5 + 4.0 * pixel * cut.z, wave));
     if (pattern == 2 && at.y < CHEST + 0.06 && at.y > CHEST - 0.06) cloth = accent.rgb;
     if (pattern == 3 && at.z > 0.0) {
-        vec2 print = vec2(side / 0.085, (at.y - CHEST + 0.06) / 0.075);
-        cloth = mix(cloth, accent.rgb, 0.85 * (1.0 - smoothstep(0.9, 0.95 + 8.0 * pixel, max(print.x, abs(print.y)))));
+        vec2 print = vec2(side / 0.075, (at.y - CHEST + 0.05) / 0.060);
+        cloth = mix(cloth, accent.rgb, 0.85 * (1.0 - smoothstep(0.9, 0.95 + 8.0 * pixel, length(print))));
     }
     if (pattern == 4 && at.z > 0.0) {
         float open = 0.016 + 0.10 * clamp(at.y - CHEST + 0.35, 0.0, 0.5);
@@ -53,7 +95,7 @@ Material top_cloth(int slot, vec3 at, float pixel) {
         cloth *= 1.0 - 0.5 * (1.0 - smoothstep(0.002, 0.006 + pixel, abs(side - open)));
     }
     if (pattern == 5 && at.z > 0.0 && side < 0.004 + 0.5 * pixel) cloth *= 0.5;
-    return Material(cloth, 0.03);
+    return Material(cloth, 0.02);
 }
 
 // `piece`: what it belongs to; `at` and `normal` in rest pose.
@@ -65,7 +107,11 @@ Material clothes(int slot, int piece, vec3 at, vec3 normal) {
         float belt = look(slot, 6).x * step(look(slot, 7).x - 0.035, at.y);
         return Material(mix(look(slot, 2).rgb, vec3(0.05, 0.035, 0.025), belt), 0.03);
     }
-    if (piece == HAIR) return Material(look(slot, 3).rgb * (0.85 + 0.3 * normal.y), 0.10);
+    if (piece == HAIR) {
+        float around = atan(at.x, at.z - HEAD_MIDDLE + 0.02);
+        float strands = mix(noise(vec3(around * 30.0, at.y * 11.0, 3.0)), 0.5, smoothstep(0.002, 0.008, pixel));
+        return Material(look(slot, 3).rgb * (0.62 + 0.5 * strands + 0.25 * normal.y), 0.10);
+    }
     if (piece == SHOE) {
         vec4 shoe = look(slot, 4);
         float sole = smoothstep(0.020 + pixel, 0.020, at.y);

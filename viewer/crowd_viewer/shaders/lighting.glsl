@@ -2,8 +2,8 @@
 uniform sampler2DShadow shadow_map;
 
 const vec3 SUN_LIGHT = vec3(3.2, 2.85, 2.35);
-const vec3 SKY_LIGHT = vec3(0.46, 0.55, 0.70);
-const vec3 GROUND_LIGHT = vec3(0.25, 0.22, 0.18);
+const vec3 SKY_LIGHT = vec3(0.62, 0.72, 0.88);
+const vec3 GROUND_LIGHT = vec3(0.42, 0.38, 0.32);
 const vec3 HORIZON = vec3(0.74, 0.86, 1.02);
 const float HAZE = 0.0016;
 const float EXPOSURE = 0.60;
@@ -49,12 +49,17 @@ vec3 ambient(vec3 normal, float height) {
     return light * mix(0.55, 1.0, clamp(height * 0.9, 0.0, 1.0));
 }
 
-vec3 lit(vec3 colour, float gloss, vec3 place, vec3 normal) {
+// `sky_share`: how much of the light from around reaches the place.
+vec3 lit(vec3 colour, float gloss, vec3 place, vec3 normal, float sky_share) {
     float facing = dot(normal, sun.xyz);
     float direct = facing > 0.0 ? facing * sunlight(place, normal) : 0.0;
     vec3 view = towards_eye(place);
-    vec3 light = ambient(normal, place.y);
+    vec3 light = ambient(normal, place.y) * sky_share;
     float shine = pow(max(dot(normal, normalize(sun.xyz + view)), 0.0), 28.0) * gloss;
     float rim = pow(1.0 - max(dot(normal, view), 0.0), 4.0) * 0.16;
     return colour * (light + SUN_LIGHT * direct) + SUN_LIGHT * shine * direct + rim * light * (0.3 + colour);
+}
+
+vec3 lit(vec3 colour, float gloss, vec3 place, vec3 normal) {
+    return lit(colour, gloss, place, normal, 1.0);
 }

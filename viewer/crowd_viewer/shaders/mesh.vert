@@ -3,11 +3,13 @@ in vec3 normal;
 in uvec4 joint;
 in vec4 weight;
 in float material;
+in float open_sky;         // share of the light from around that the body does not keep away
 uniform vec3 rest[MOST_JOINTS];
 out vec3 place;
 out vec3 facing;
 out vec3 rest_place;
 out vec3 rest_normal;
+out float sky_share;
 flat out int piece;
 flat out int slot;
 
@@ -26,6 +28,7 @@ void main() {
     facing = to_world_direction(root, direction);
     rest_place = position;
     rest_normal = normal;
+    sky_share = open_sky;
     piece = int(material + 0.5);
     slot = root.slot;
     gl_Position = to_clip * vec4(place, 1.0);

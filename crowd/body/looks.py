@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from crowd.body import Recipe
+from crowd.body.builds import Recipe
 
 Float32Array = npt.NDArray[np.float32]
 FloatArray = npt.NDArray[np.float64]
@@ -128,8 +128,8 @@ def draw_looks(
     Returns
     -------
     (P, 8, 4) float32
-        Columns: skin and stubble, top, bottom, hair, shoes and their kind, accent and pattern, (belt, 0,
-        stripes per metre, 0), then the waist. What has no meaning is 0.
+        Columns: colours by `Material`, then (belt, 0, stripes per metre, 0), then (height of the waist, 0, 0,
+        0). Beside colours: beard with that of the skin, kind with the shoes', pattern with the accent's.
     """
     count = len(identity)
     look = np.zeros((count, LOOK_COLUMNS, 4))
@@ -141,7 +141,7 @@ def draw_looks(
         return chance(identity, purpose)
 
     look[:, 0, :3] = _varied(_pick(SKIN, share(1)), identity, 11, 0.10)
-    look[:, 0, 3] = np.where(is_woman, 0.0, np.maximum(1.6 * share(2) - 0.6, 0.0))
+    look[:, 0, 3] = np.where(is_woman, 0.0, np.clip(2.2 * share(2) - 1.0, 0.0, 1.0))
     look[:, 1, :3] = _varied(_pick(TOPS, share(3)), identity, 21, 0.28)
     look[:, 2, :3] = _varied(_pick(BOTTOMS, share(5)), identity, 31, 0.25)
     hair = np.where(is_old[:, None], _pick(GREY_HAIR, share(7)), _pick(HAIR, share(7)))
@@ -153,7 +153,7 @@ def draw_looks(
     look[:, 4, 3] = share(10) < 0.4
     look[:, 5, :3] = _varied(_pick(TOPS, share(61)), identity, 62, 0.3)
     pattern = share(63)
-    casual = np.digitize(pattern, (0.58, 0.74, 0.84)) % 4
+    casual = np.digitize(pattern, (0.66, 0.82, 0.92)) % 4
     look[:, 5, 3] = np.where(outer, np.where(pattern < 0.5, OPEN_FRONT, ZIP), casual)
     look[:, 6, 0] = share(64) < 0.4
     look[:, 6, 2] = 9.0 + 14.0 * share(66)
