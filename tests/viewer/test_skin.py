@@ -132,3 +132,25 @@ def test_a_wrongly_bent_knee_is_seen_by_the_block_difference(drawing, walkers, c
     block, mean = block_difference(right, moved)
     assert block < 6.0
     assert abs(mean) < 1.0
+
+
+@pytest.mark.parametrize("level", range(4))
+def test_levels_change_where_nobody_notices(drawing, walkers, close_camera, level):
+    """At the height on the screen where one level takes over from the other both cover the same pixels."""
+    from crowd_viewer.frame import source_of
+
+    source, chosen = source_of(walkers), close_camera[0]
+    height = drawing.FINE.least_height[level]
+    place, yaw = walkers.state.position_world[chosen], float(walkers.state.yaw[chosen])
+    far = drawing.Camera.around(place + [0.0, 0.9, 0.0], 10.0, yaw + 0.5, 0.3)
+    away = 10.0 * far.pixels_at_one_metre(SIZE[1]) * float(source.scene.stature[chosen]) / (10.0 * height)
+    camera = drawing.Camera.around(place + [0.0, 0.9, 0.0], away, yaw + 0.5, 0.3)
+    covered = []
+    for chosen_level in (level, level + 1):
+        heights = tuple(1e9 if k < chosen_level else 0.0 for k in range(4))
+        with renderer_of(source, replace(drawing.FINE, least_height=heights)) as renderer:
+            seen, _ = renderer.identities(source.frame(), camera)
+        covered.append(seen > 0)
+    fine, coarse = covered
+    # The smaller people are, the larger is the share of their rims.
+    assert (fine & coarse).sum() > (0.93, 0.90, 0.72, 0.64)[level] * (fine | coarse).sum()
