@@ -6,7 +6,7 @@ import math
 import os
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from crowd.characters import Cast
 from crowd.errors import describe
 from crowd.joints import Joints
+from crowd.motion.rotation import slerp
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.recorder import PELVIS, ROTATION, ROTATION_STEPS
 from crowd.recording import Recording
@@ -23,6 +24,7 @@ from crowd.scenario import Scenario
 from crowd.simulation import Simulation
 from crowd.state import State
 from crowd.trajectories import Trajectories, open_recording
+from crowd.world.objects import Objects
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_viewer.context import ViewerError
 from crowd_viewer.solids import Solid, scenario_solids, wall_solids
@@ -32,6 +34,8 @@ Float32Array = npt.NDArray[np.float32]
 Shown = Simulation | Recording | Trajectories | str | os.PathLike[str]
 """What can be shown: paths are those of recordings and of files that `crowd.load_trajectories` reads."""
 SAMPLED_FRAMES = 50
+LARGEST_STEP = 1.0
+"""An object that is farther away in the next frame has not been carried there, m."""
 Quantity = Callable[[str], npt.NDArray[Any] | None]
 LARGEST_IDENTITY = 1 << 24
 
@@ -56,6 +60,10 @@ class CrowdFrame:
         In the root frame, m.
     joint_rotation_model : (N, J, 4) float32
         In the root frame, unit quaternions.
+    object_position_world : (M, 3) float64 or None
+        Centres of the scene's objects, m; None where they are as at the start.
+    object_rotation_world : (M, 4) or None
+        Unit quaternions.
     """
 
     time: float
@@ -65,6 +73,8 @@ class CrowdFrame:
     yaw: FloatArray
     joint_position_model: Float32Array
     joint_rotation_model: Float32Array
+    object_position_world: FloatArray | None = None
+    object_rotation_world: npt.NDArray[np.floating[Any]] | None = None
 
     @property
     def places(self) -> FloatArray:
@@ -91,6 +101,8 @@ class Scene:
         Walls and obstacles.
     cast : Cast
         Characters of the user's that people are drawn as.
+    objects : Objects
+        Things that people can grasp.
     """
 
     name: str
@@ -101,6 +113,7 @@ class Scene:
     bounds: tuple[float, float, float, float]
     solids: tuple[Solid, ...]
     cast: Cast
+    objects: Objects = field(default_factory=Objects.none)
 
 
 class Source(Protocol):
@@ -158,6 +171,7 @@ class LiveSource:
             bounds,
             tuple(scenario_solids(scenario.world)),
             model.cast,
+            model.objects,
         )
         self._standing: Joints | None = None
 
@@ -177,6 +191,8 @@ class LiveSource:
             state.yaw,
             joints.position_model,
             joints.rotation_model,
+            simulation.objects.position_world,
+            simulation.objects.rotation_world,
         )
 
     def places(self) -> FloatArray:
@@ -213,6 +229,7 @@ class ReplaySource:
             bounds,
             solids,
             recording.cast,
+            recording.objects,
         )
         self._pose = State.create(recording.character_count)
         self._joints = standing_joints(self.scene)
@@ -248,7 +265,21 @@ class ReplaySource:
             both["yaw"][0] + weight * turn,
             self._joints.position_model,
             self._joints.rotation_model,
+            *self._objects(before, after, share),
         )
+
+    def _objects(self, before: int, after: int, share: float) -> tuple[FloatArray | None, FloatArray | None]:
+        """Where objects are between two frames."""
+        if self.recording.objects.count == 0:
+            return None, None
+        position, rotation = (
+            [self.recording.read_objects(name, frame).astype(np.float64) for frame in (before, after)]
+            for name in ("position_world", "rotation_world")
+        )
+        # A thing that changes hands or is put back jumps.
+        weight = np.where(np.linalg.norm(position[1] - position[0], axis=1) < LARGEST_STEP, share, 1.0)
+        mixed = position[0] + weight[:, None] * (position[1] - position[0])
+        return mixed, slerp(rotation[0], rotation[1], weight)
 
     def places(self, start: float = -math.inf, stop: float = math.inf) -> FloatArray:
         """Where people are in some frames from `start` to `stop`, s. (P, 3) m."""

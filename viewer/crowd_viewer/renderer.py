@@ -21,6 +21,7 @@ from crowd_viewer.quality import FINE, Quality
 from crowd_viewer.shadows import Light
 from crowd_viewer.surroundings import Surroundings
 from crowd_viewer.targets import Targets
+from crowd_viewer.things import Things
 
 if TYPE_CHECKING:
     import moderngl
@@ -63,6 +64,7 @@ class Renderer:
         self.people = People(context, scene, quality, bodies)
         self.characters = Characters(context, scene, quality)
         self.surroundings = Surroundings(context, scene, self.origin)
+        self.things = Things(context, scene.objects)
         self.ground_map: GroundMap | None = None
         """Drawn on the ground, below the people."""
         self._view = context.buffer(reserve=192, dynamic=True)
@@ -104,6 +106,7 @@ class Renderer:
         targets.use_identity()
         context.enable_only(context.DEPTH_TEST)
         self.surroundings.draw_solids(frame.time, is_plain=True)
+        self.things.draw(is_plain=True)
         self.people.draw("identity")
         self.characters.draw("identity")
         return targets.read_identity(), self._metres(targets.read_depth())
@@ -123,6 +126,7 @@ class Renderer:
         self.light.release()
         self.people.release()
         self.characters.release()
+        self.things.release()
 
     def __enter__(self) -> Self:
         return self
@@ -145,6 +149,7 @@ class Renderer:
         planes = view_planes(projection @ camera.view(np.zeros(3)))
         eye, pixels = np.asarray(camera.eye, np.float64), camera.pixels_at_one_metre(height)
         is_perspective = camera.is_perspective
+        self.things.update(frame, self.origin)
         left = self.characters.update(frame, planes, eye, pixels, self.origin, is_perspective=is_perspective)
         self.people.update(
             replace(frame, is_active=left),
@@ -185,6 +190,7 @@ class Renderer:
         self.light.use()
         context.enable_only(context.DEPTH_TEST)
         self.surroundings.draw_solids(frame.time, is_plain=True)
+        self.things.draw(is_plain=True)
         self.people.draw("shadow")
         self.characters.draw("shadow")
 
@@ -196,6 +202,7 @@ class Renderer:
         context.enable_only(context.DEPTH_TEST)
         context.depth_func = "<="
         self.surroundings.draw_solids(frame.time)
+        self.things.draw()
         if self.quality.samples:
             context.enable_direct(ALPHA_TO_COVERAGE)
         self.people.draw("colour")

@@ -17,7 +17,9 @@ from crowd.scenario.schema import WorldTable
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
-WALL_THICKNESS = 0.12
+WALL_THICKNESS, DOOR_THICKNESS = 0.12, 0.06
+DOOR_GAP = 0.01
+"""Between the top of a door and what is beside it, m."""
 BEVEL = 0.025
 """Width of the slanted rim, which catches light as edges of real things do, m."""
 UNKNOWN_HEIGHT = 1.0
@@ -44,10 +46,11 @@ class Solid:
 def scenario_solids(world: WorldTable) -> Iterator[Solid]:
     """Everything solid in a scenario's world."""
     for _, item, shape in obstacles(world):
-        thick = _thickened(shape)
         last = math.inf if item.disappear_at is None else item.disappear_at
         if item.height > 0.0:
-            yield Solid(prism(thick, item.height), item.appear_at, last)
+            outline = _thickened(shape) if item.is_permanent else _door(shape)
+            height = item.height - (0.0 if item.is_permanent else DOOR_GAP)
+            yield Solid(prism(outline, max(height, 0.5 * item.height)), item.appear_at, last)
 
 
 def wall_solids(walls: FloatArray, appear_at: FloatArray, disappear_at: FloatArray) -> Iterator[Solid]:
@@ -63,6 +66,11 @@ def _thickened(shape: BaseGeometry) -> BaseGeometry:
     if shape.area > 0.0:
         return shape
     return shape.buffer(0.5 * WALL_THICKNESS, cap_style="square", join_style="mitre")
+
+
+def _door(shape: BaseGeometry) -> BaseGeometry:
+    """Walls that come or go are thinner, so that they end inside of those that stay."""
+    return shape if shape.area > 0.0 else shape.buffer(0.5 * DOOR_THICKNESS, cap_style="flat")
 
 
 def prism(outline: BaseGeometry, height: float) -> Float32Array:

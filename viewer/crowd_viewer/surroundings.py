@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,4 +64,6 @@ class Surroundings:
         """Draw the walls and obstacles that are there at a time, s; plain ones have no colour."""
         for appear_at, disappear_at, shaded, plain in self._solids:
             if appear_at <= time < disappear_at:
+                # What comes or goes is of wood, as doors and barriers are.
+                self._solid["wood"] = float(appear_at > 0.0 or disappear_at < math.inf)
                 (plain if is_plain else shaded).render()
