@@ -239,23 +239,19 @@ def _targets(lines: Lines, seen: Seen) -> None:
     """What people look at, and what they reach for, where layers for it say so."""
     skeleton = seen.scene.skeleton
     joints = joint_positions(seen.frame, seen.rows)
-    gaze = seen.of_rows("gaze_target_world")
-    if gaze is not None:
-        looks = _share(seen, "gaze_weight", len(seen.rows)) > 0.0
+    gaze, share = seen.of_rows("gaze_target_world"), seen.of_rows("gaze_weight")
+    if gaze is not None and share is not None:
+        looks = share > 0.0
         eyes = joints[:, [skeleton.joint("left_eye"), skeleton.joint("right_eye")]].mean(axis=1)
         lines.add(eyes[looks], gaze[looks].astype(np.float64), GAZE)
-    target = seen.of_rows("reach_target_world")
-    if target is not None:
-        reaches = _share(seen, "reach_weight", len(seen.rows)) > 0.0
-        points = target[reaches].astype(np.float64)
-        for axis in 0.06 * np.eye(3):
-            lines.add(points - axis, points + axis, REACH)
-
-
-def _share(seen: Seen, name: str, count: int) -> FloatArray:
-    """Weight of a layer for each person, everyone's when it has none."""
-    values = seen.of_rows(name)
-    return np.ones(count) if values is None else values.astype(np.float64)
+    target, share = seen.of_rows("reach_target_world"), seen.of_rows("reach_weight")
+    if target is not None and share is not None:
+        for side, name in enumerate(("right_hand", "left_hand")):
+            reaches = share[:, side] > 0.0
+            points = target[reaches, side].astype(np.float64)
+            lines.add(joints[reaches, skeleton.joint(name)], points, (*REACH[:3], 0.5))
+            for axis in 0.06 * np.eye(3):
+                lines.add(points - axis, points + axis, REACH)
 
 
 LAYERS: Mapping[str, Callable[[Lines, Seen], None]] = {
