@@ -35,6 +35,7 @@ class Onlookers:
     pose: npt.NDArray[np.float32]
     scale: npt.NDArray[np.float32]
     trunk: npt.NDArray[np.float32]
+    follow: npt.NDArray[np.float32]
     active: npt.NDArray[np.int32]
     step: int = 0
     offsets: list[float] = field(default_factory=list)
@@ -57,6 +58,7 @@ def set_up(size: int, rng: np.random.Generator) -> Onlookers:
         state.pose_rotation.copy(),
         rng.uniform(0.9, 1.1, (size, len(Segment))).astype(np.float32),
         np.ones(size, np.float32),
+        np.ones(size, np.float32),
         np.arange(size, dtype=np.int32),
     )
     heading = state.yaw + rng.uniform(-1.7, 1.7, size)
@@ -77,6 +79,7 @@ def turn(data: Onlookers) -> None:
         state.position_world,
         state.yaw,
         data.trunk,
+        data.follow,
         state.gaze_kind,
         state.gaze_target_world,
         state.saccade_offset,

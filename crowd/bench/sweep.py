@@ -23,6 +23,7 @@ MOST_ACCELERATION_RATIO = 1.2
 SPACING = 40.0
 SETTLE_SECONDS = 4.0
 MEASURE_CYCLES = 6
+LOOK_STEPS = 50
 SLOWEST = 0.3
 
 
@@ -235,6 +236,7 @@ def transitions(
                 simulation.commands.set_locomotion(late, parameters)
             rotations.append(simulation.joint_rotations_local())
         results[name] = largest_acceleration(np.array(rotations)[20:], 1.0 / simulation.dt)
+    results["look about while walking"] = look_about(motions, seconds, people)
     assert library is not None
     examples = max(
         largest_acceleration(clip.rotation_local[:, None], clip.frame_rate)
@@ -242,6 +244,21 @@ def transitions(
         if clip.kind in (ClipKind.LOCOMOTION, ClipKind.START, ClipKind.STOP)
     )
     return TransitionResult(examples, results)
+
+
+def look_about(motions: MotionLibrary | None, seconds: float, people: int, seed: int = 1) -> float:
+    """Largest angular acceleration of walkers who look at new points again and again, rad/s^2."""
+    simulation = Simulation(lone_people(people), motions=motions)
+    simulation.commands.set_locomotion(slice(None), (1.3, 0.2, 0.0))
+    rng, rotations = np.random.default_rng(seed), []
+    for frame in simulation.run(seconds=seconds):
+        if frame.index % LOOK_STEPS == 0:
+            looking = np.flatnonzero(rng.random(people) < 0.7)
+            away = rng.normal(0.0, 3.0, (looking.size, 3)) + (0.0, 1.5, 0.0)
+            simulation.commands.look_away(slice(None))
+            simulation.commands.look_at(looking, simulation.state.position_world[looking] + away)
+        rotations.append(simulation.joint_rotations_local())
+    return largest_acceleration(np.array(rotations)[20:], 1.0 / simulation.dt)
 
 
 def largest_acceleration(rotations: npt.NDArray[np.floating], rate: float) -> float:

@@ -130,7 +130,7 @@ class GazeSettings:
     eye_pitch: float = math.radians(35.0)
     eye_heading: float = math.radians(40.0)
     """Half axes of the ellipse in which eyes turn."""
-    eye_speed: float = math.radians(800.0)
+    eye_speed: float = math.radians(700.0)
     """Largest speed of the eyes against the head, saccades apart; above that of any human eye."""
     head_speed: float = math.radians(180.0)
     """Largest speed that gaze gives to the head."""
@@ -138,6 +138,8 @@ class GazeSettings:
     """1/s. Rate with which gaze comes and goes; larger: quicker, less soft."""
     walking_trunk: float = 0.3
     """Share of the trunk's part that remains while walking."""
+    gesture_follow: float = 0.15
+    """How readily the head follows while a gesture moves it, 0 to 1; larger cancels nods."""
     glances: GlanceSettings = field(default_factory=GlanceSettings)
     saccades: tuple[SaccadeSettings, ...] = SACCADES
 
@@ -197,6 +199,7 @@ class Gaze:
             self._mode[:] = [mode_index(attention) for attention in placed.attention]
         self._cells = None if avoidance is None else avoidance.steer_cells
         self._trunk: Float32Array = np.ones(capacity, np.float32)
+        self._follow: Float32Array = np.ones(capacity, np.float32)
         self._turned: IntArray = np.zeros(capacity, np.int32)
         self._resting: IntArray = np.zeros(capacity, np.int32)
         self.scratch: Float32Array = np.zeros(
@@ -359,6 +362,10 @@ class Gaze:
             state.gaze_target_world[handling] = self._object_points(state.gaze_index[handling])
         remaining = 1.0 - (1.0 - self.settings.walking_trunk) * state.locomotion_weight[turned]
         self._trunk[turned] = state.gaze_trunk[turned] * remaining
+        table, head = step.model.clip_table, self.arrays.joint[-1]
+        moves_head = table.joint_mask[table.mask_index, head][state.play_clip[turned]]
+        held = (1.0 - self.settings.gesture_follow) * moves_head * state.play_weight[turned]
+        self._follow[turned] = 1.0 - held
         capacity = state.capacity
         gaze_crowd(
             self.arrays,
@@ -367,6 +374,7 @@ class Gaze:
             state.position_world,
             state.yaw,
             self._trunk,
+            self._follow,
             state.gaze_kind,
             state.gaze_target_world,
             state.saccade_offset,

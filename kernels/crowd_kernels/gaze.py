@@ -16,6 +16,7 @@ from crowd_kernels.gaze_rows import (
     EYE,
     EYE_ROW,
     EYE_SCALE,
+    FOLLOW,
     GOAL,
     JOINT_ROW,
     OFFSET,
@@ -156,6 +157,7 @@ def gather_root(
     position_world: Any,
     yaw: Any,
     trunk: Any,
+    follow: Any,
     kind: Any,
     target_world: Any,
     pose_pelvis: Any,
@@ -192,6 +194,7 @@ def gather_root(
             carry[POSITION + axis * LANES + lane] = pose_pelvis[character, axis] * leg
         carry[GOAL + lane] = ONE if kind[character] != NOTHING else ZERO
         carry[TRUNK + lane] = trunk[character]
+        carry[FOLLOW + lane] = follow[character]
         carry[WEIGHT + lane] = weight[character]
         carry[WEIGHT_RATE + lane] = weight_rate[character]
 
@@ -397,6 +400,7 @@ def gaze_chunk(
     position_world: Any,
     yaw: Any,
     trunk: Any,
+    follow: Any,
     kind: Any,
     target_world: Any,
     saccade: Any,
@@ -440,6 +444,7 @@ def gaze_chunk(
             position_world,
             yaw,
             trunk,
+            follow,
             kind,
             target_world,
             pose_pelvis,
@@ -499,6 +504,7 @@ def gaze_crowd(
     position_world: Any,
     yaw: Any,
     trunk: Any,
+    follow: Any,
     kind: Any,
     target_world: Any,
     saccade: Any,
@@ -529,6 +535,8 @@ def gaze_crowd(
         Heading, rad.
     trunk : (N,) float32
         Share of the trunk that takes part, 0 to 1.
+    follow : (N,) float32
+        How readily joints follow, 0 to 1; less lets gestures move the head, while the eyes stay on target.
     kind : (N,) uint8
         0: look at nothing, any turn that is left fades; else there is a target.
     target_world : (N, 3) float64
@@ -577,6 +585,7 @@ def gaze_crowd(
             position_world,
             yaw,
             trunk,
+            follow,
             kind,
             target_world,
             saccade,

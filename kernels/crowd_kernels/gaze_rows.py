@@ -16,11 +16,12 @@ ROTATION, TURN, RATE, WANTED, AHEAD, EYE = 0, 64, 112, 160, 208, 256
 SHARE, SCALE, JOINT_ROW = 304, 320, 336
 """Joint: local rotation, turn and its rate, turn that is wanted, the head's forward axis and the point
 between the eyes in the joint's frame, share of what is missing, proportion."""
-POSITION, TARGET, WEIGHT, WEIGHT_RATE, GOAL, SIDE, TRUNK, SUM, SPEED, EXCESS, MEAN, CARRY_ROW = (
-    64, 112, 160, 176, 192, 208, 224, 240, 256, 272, 288, 304,
+POSITION, TARGET, WEIGHT, WEIGHT_RATE, GOAL, SIDE, TRUNK, SUM, SPEED, EXCESS, MEAN, FOLLOW, CARRY_ROW = (
+    64, 112, 160, 176, 192, 208, 224, 240, 256, 272, 288, 304, 320,
 )  # fmt: skip
 """Carried: rotation, position, target, weight with rate and goal, side of the present turn, share of the
-trunk, sum of shares, speed, how far the target is out of the eyes' limits, mean weight of the step."""
+trunk, sum of shares, speed, how far the target is out of the eyes' limits, mean weight of the step,
+how readily joints follow."""
 OFFSET, EYE_SCALE, ERROR, EYE_ROW = 96, 128, 144, 160
 """Eye: local rotation, turn (2), saccade (2), proportion, remaining error."""
 
@@ -317,17 +318,22 @@ def swing_row(row: Any, carry: Any, frequency: Any, decay: Any, dt: Any) -> None
         1/s, exp(-frequency dt), s.
     """
     for lane in range(LANES):
-        weight = carry[MEAN + lane]
+        follow = carry[FOLLOW + lane]
+        share = follow * carry[MEAN + lane]
+        keep = ONE - follow
         x, x_rate = spring_step(
-            row[TURN + lane], row[RATE + lane], weight * row[WANTED + lane], frequency, decay, dt
-        )
+            row[TURN + lane], row[RATE + lane], share * row[WANTED + lane] + keep * row[TURN + lane],
+            frequency, decay, dt,
+        )  # fmt: skip
         y, y_rate = spring_step(
-            row[TURN + LANES + lane], row[RATE + LANES + lane], weight * row[WANTED + LANES + lane],
+            row[TURN + LANES + lane], row[RATE + LANES + lane],
+            share * row[WANTED + LANES + lane] + keep * row[TURN + LANES + lane],
             frequency, decay, dt,
         )  # fmt: skip
         z, z_rate = spring_step(
             row[TURN + 2 * LANES + lane], row[RATE + 2 * LANES + lane],
-            weight * row[WANTED + 2 * LANES + lane], frequency, decay, dt,
+            share * row[WANTED + 2 * LANES + lane] + keep * row[TURN + 2 * LANES + lane],
+            frequency, decay, dt,
         )  # fmt: skip
         x -= row[TURN + lane]
         y -= row[TURN + LANES + lane]

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import crowd
+from crowd.bench.sweep import MOST_ACCELERATION_RATIO, largest_acceleration, look_about
 from crowd.controllers.gaze import Gaze, GazeSettings, GlanceSettings
 from crowd.errors import SettingsError
+from crowd.motion.clip import ClipKind
 from crowd.scenario.schema import Area, Character, Goal, Region, Scenario, WorldTable
 from crowd_kernels.gaze import ON_TARGET, REFUSED
 
@@ -199,3 +201,50 @@ def test_equal_bits_on_two_threads_and_after_a_stop(tmp_path):
     for simulation in (two, other):
         for name, array in gaze_of(simulation).items():
             np.testing.assert_array_equal(array, wanted[name], err_msg=name)
+
+
+def test_somebody_who_looks_at_a_point_still_nods():
+    depths = []
+    for looks in (False, True):
+        simulation = pair()
+        simulation.gaze.may_glance[:] = False
+        simulation.commands.set_attention(0, "none")
+        if looks:
+            simulation.commands.look_at(0, (0.0, 1.6, 3.0))
+        for _ in simulation.run(seconds=2.0):
+            pass
+        simulation.commands.play(0, "nod")
+        head = simulation.model.skeleton.joint("head")
+        ahead = []
+        for _ in simulation.run(seconds=2.0):
+            w, x, y, z = simulation.joints.rotation_model[0, head].astype(float)
+            ahead.append(np.degrees(np.arcsin(2 * (y * z - w * x))))
+            if looks:
+                assert max(eye_misses(simulation, 0, np.array([0.0, 1.6, 3.0]))) < 1.0
+        depths.append(np.ptp(ahead))
+    assert depths[1] > 0.75 * depths[0] > 3.0
+
+
+def test_nothing_pops_when_targets_come_jump_and_go():
+    library = pair().model.library
+    examples = max(
+        largest_acceleration(clip.rotation_local[:, None], clip.frame_rate)
+        for clip in library.clips
+        if clip.kind is ClipKind.LOCOMOTION
+    )
+    assert look_about(None, 5.0, 12) < MOST_ACCELERATION_RATIO * examples
+
+
+def test_heads_start_and_stop_softly():
+    simulation = crowd.Simulation(square(16), seed=3)
+    head = [simulation.model.skeleton.joint(name) for name in ("neck_1", "neck_2", "head")]
+    rotations = []
+    for frame in simulation.run(seconds=6.0):
+        if frame.index % 45 == 20:
+            step = frame.index // 45
+            simulation.commands.look_at(
+                slice(None), (9.0 * (-1) ** step, 1.0 + step % 3, 4.0 * (-1) ** (step // 2))
+            )
+        rotations.append(simulation.joint_rotations_local()[:, head])
+    # Without gaze the necks of people who turn round suddenly reach 61 rad/s^2.
+    assert largest_acceleration(np.array(rotations)[10:], 60.0) < 110.0

@@ -48,7 +48,7 @@ class Watchers:
         self.pose = np.tile(REST, (count, 1)) if pose is None else pose
         self.state.pose_pelvis[:] = SKELETON.offset[0]
         self.scale = np.ones((count, 8), np.float32) if scale is None else scale
-        self.trunk = np.ones(count, np.float32)
+        self.trunk, self.follow = np.ones(count, np.float32), np.ones(count, np.float32)
         self.active = np.arange(count, dtype=np.int32)
         self.scratch = np.zeros((CHUNKS, scratch_length(len(ARRAYS.joint))), np.float32)
 
@@ -61,10 +61,10 @@ class Watchers:
         s.pose_rotation[active] = self.pose[active]
         turn, rate = s.gaze_turn.reshape(count, -1), s.gaze_turn_rate.reshape(count, -1)
         gaze_crowd(
-            self.gaze.arrays, self.gaze.limits, self.scale, s.position_world, s.yaw, self.trunk, s.gaze_kind,
-            s.gaze_target_world, s.saccade_offset, active, dt, self.scratch, s.pose_rotation, s.pose_pelvis,
-            turn, rate, s.gaze_eye_turn.reshape(count, -1), s.gaze_weight, s.gaze_weight_rate, s.gaze_error,
-            s.gaze_status,
+            self.gaze.arrays, self.gaze.limits, self.scale, s.position_world, s.yaw, self.trunk, self.follow,
+            s.gaze_kind, s.gaze_target_world, s.saccade_offset, active, dt, self.scratch, s.pose_rotation,
+            s.pose_pelvis, turn, rate, s.gaze_eye_turn.reshape(count, -1), s.gaze_weight,
+            s.gaze_weight_rate, s.gaze_error, s.gaze_status,
         )  # fmt: skip
 
     def run(self, seconds, dt=DT):
@@ -124,7 +124,7 @@ def test_steps_agree_with_the_slow_twin(rng):
     s = people.state
     s.position_world[:, [0, 2]] = rng.normal(0, 30, (count, 2))
     s.yaw[:] = rng.uniform(-np.pi, np.pi, count)
-    people.trunk[:] = rng.random(count)
+    people.trunk[:], people.follow[:] = rng.random(count), 1 - 0.8 * (rng.random(count) < 0.3)
     s.saccade_offset[:] = rng.normal(0, 0.15, (count, 2))
     targets = s.position_world + rng.normal(0, 2, (count, 3)) + [0, 1.5, 0]
     targets[::9] = np.nan
@@ -140,7 +140,7 @@ def test_steps_agree_with_the_slow_twin(rng):
             looks = s.gaze_kind[character] != 0
             local, error = oracle.gaze(
                 ARRAYS, LIMITS, scale[character], s.position_world[character], s.yaw[character],
-                people.trunk[character], targets[character] if looks else None,
+                people.trunk[character], people.follow[character], targets[character] if looks else None,
                 s.saccade_offset[character], DT, pose[character], s.pose_pelvis[character], person,
             )  # fmt: skip
             if index % 13 == 0:

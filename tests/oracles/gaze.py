@@ -108,7 +108,9 @@ def frame_of(chain, turns, k):
     return rotation, position
 
 
-def gaze(arrays, limits, scale, place, yaw, trunk, target_world, saccade, dt, pose_row, pelvis, person):
+def gaze(
+    arrays, limits, scale, place, yaw, trunk, follow, target_world, saccade, dt, pose_row, pelvis, person
+):
     """One step; `target_world` None for nothing. Returns local matrices of chain and eyes, and the error."""
     chain = Chain(arrays, scale, pose_row, pelvis)
     rotation, position = chain.head(np.zeros((len(chain.local), 3)))
@@ -127,9 +129,10 @@ def gaze(arrays, limits, scale, place, yaw, trunk, target_world, saccade, dt, po
     heading = person.turn[:, 1].sum()
     side = 0.0 if abs(heading) < 0.1 else np.sign(heading)
     wanted = mean * wanted_turns(arrays, limits, chain, target, trunk, side)
+    goals = person.turn + follow * (wanted - person.turn)
     moved, rate = np.zeros_like(wanted), np.zeros_like(wanted)
     for k in range(len(wanted)):
-        moved[k], rate[k] = spring(person.turn[k], person.rate[k], wanted[k], float(arrays.rate[k]), dt)
+        moved[k], rate[k] = spring(person.turn[k], person.rate[k], goals[k], float(arrays.rate[k]), dt)
     step = moved - person.turn
     slow = min(float(limits.head_speed) * dt / max(np.linalg.norm(step, axis=1).sum(), 1e-12), 1.0)
     person.turn, person.rate = person.turn + slow * step, slow * rate
