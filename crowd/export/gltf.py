@@ -138,25 +138,22 @@ def write_person(selection: Selection, visit: Visit, body: Body, path: Path) -> 
     with path.open("wb") as file:
         file.write(head)
         file.truncate(len(head) + layout.size)
-    binary = np.memmap(path, np.uint8, "r+", offset=len(head), shape=(layout.size,))
-    for offset, values in layout.filled:
-        flat = values.view(np.uint8).reshape(-1)
-        binary[offset : offset + len(flat)] = flat
-    for block in selection.blocks(1):
-        begin, end = max(block.start, visit.first), min(block.stop, visit.last + 1)
-        if begin < end:
+        for offset, values in layout.filled:
+            file.seek(len(head) + offset)
+            file.write(values.tobytes())
+        for block in selection.blocks(1):
+            begin, end = max(block.start, visit.first), min(block.stop, visit.last + 1)
+            if begin >= end:
+                continue
             tracks = body.tracks(recording, recording.poses(slice(begin, end), slots), visit.slot)
             for joint in range(joints):
-                xyzw = tracks.rotation[:, joint][:, [1, 2, 3, 0]]
-                _write(binary, layout.offset(turns[joint]), begin - visit.first, xyzw)
-                _write(binary, layout.offset(moves[joint]), begin - visit.first, tracks.translation[:, joint])
-    binary.flush()
-
-
-def _write(binary: AnyArray, offset: int, row: int, values: AnyArray) -> None:
-    flat = np.ascontiguousarray(values, np.float32)
-    begin = offset + row * 4 * flat.shape[1]
-    binary[begin : begin + flat.nbytes] = flat.view(np.uint8).reshape(-1)
+                for accessor, values in (
+                    (turns[joint], tracks.rotation[:, joint][:, [1, 2, 3, 0]]),
+                    (moves[joint], tracks.translation[:, joint]),
+                ):
+                    rows = np.ascontiguousarray(values, np.float32)
+                    file.seek(len(head) + layout.offset(accessor) + (begin - visit.first) * rows[0].nbytes)
+                    file.write(rows.tobytes())
 
 
 def _header(content: dict[str, Any], size: int) -> bytes:

@@ -262,7 +262,7 @@ def test_blocks_do_not_change_a_file(plaza, tmp_path, monkeypatch):
         assert one == many
 
 
-@pytest.mark.parametrize("format_name", ["csv", "npz", "bvh", "coco", "jupedsim"])
+@pytest.mark.parametrize("format_name", ["csv", "npz", "bvh", "gltf", "coco", "jupedsim"])
 def test_memory_does_not_grow_with_length(corridor, tmp_path, monkeypatch, format_name):
     monkeypatch.setattr(selections, "BLOCK_BYTES", 1 << 20)
 
