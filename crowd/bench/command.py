@@ -106,15 +106,15 @@ def kernels(
 def sweep(
     points: Annotated[int, typer.Option(min=50, help="Points of the locomotion space.")] = 300,
     motions: Annotated[
-        Path | None, typer.Option(help="Motion library made by `crowd motions import`.")
+        Path | None, typer.Option(help="Motion library made by `crowd motions import`, or a folder.")
     ] = None,
 ) -> int:
     """Realised against commanded motion over the locomotion space, and joint pops at changes of motion."""
     from crowd.bench.sweep import sweep as run_sweep
     from crowd.bench.sweep import transitions
-    from crowd.motion.library_file import load_library
+    from crowd.motion.importing.folder import load_or_import
 
-    library = None if motions is None else load_library(motions)
+    library = None if motions is None else load_or_import(motions)
     result = run_sweep(points, library)
     print(f"points {result.points}, stances {result.stances}")
     print(f"speed rms relative    {result.speed_rms_relative:.5f}")

@@ -36,7 +36,7 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(help="Key of all random choices.")] = 0,
     motions: Annotated[
-        Path | None, typer.Option(help="Motion library made by `crowd motions import`.")
+        Path | None, typer.Option(help="Motion library made by `crowd motions import`, or a folder.")
     ] = None,
     character: Annotated[
         list[Path] | None, typer.Option(help="Skinned glTF character to draw people as; may be repeated.")
@@ -56,14 +56,14 @@ def run(
         raise SettingsError(describe("--seconds", "is out of range", seconds, "> 0 to 86400"))
     from crowd.cli.output import require_folder, write_json
     from crowd.cli.showing import draw_picture, film, require_viewer
-    from crowd.motion.library_file import load_library
+    from crowd.motion.importing.folder import load_or_import
     from crowd.scenario import load_scenario
 
     require_viewer(picture, video, view=view)
     require_folder("--record", record)
     require_folder("--metrics", metrics)
     loaded = load_scenario(scenario)
-    library = None if motions is None else load_library(motions)
+    library = None if motions is None else load_or_import(motions)
     simulation, compile_seconds = _prepare(loaded, seed, threads, characters, library, character or [])
     sinks = [sink for sink in (_open_recorder(record, simulation), film(video, simulation)) if sink]
     wall_seconds, was_stopped = _advance(simulation, sinks, seconds, is_shown=view)

@@ -160,7 +160,7 @@ def test_a_mapping_file_beside_the_character_is_used(own_bones, tmp_path):
     (tmp_path / "one.glb").write_bytes((own_bones / "one.glb").read_bytes())
     roles = [f"{side}_{part}" for side in ("left", "right") for part in ("thigh", "shank", "foot")]
     lines = [f'{role} = "{role}"' for role in ("pelvis", *roles)]
-    (tmp_path / "one.joints.toml").write_text("\n".join(lines))
+    (tmp_path / "one.joints.toml").write_text("\n".join([*lines, "head = []"]))
     joints = load_character(tmp_path / "one.glb").joints
     assert joints.family.endswith("one.joints.toml")
     assert "head" in joints.unused

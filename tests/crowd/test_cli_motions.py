@@ -78,6 +78,13 @@ def test_an_import_prints_what_it_found_and_the_library_shows_it(folder, tmp_pat
     assert json.loads(metrics.read_text())["characters"] == 20
 
 
+def test_a_folder_of_clips_is_a_library_too(folder, tmp_path):
+    metrics = tmp_path / "m.json"
+    run = ["run", "plaza", "--motions", str(folder / "clips"), "--seconds", "1", "--metrics", str(metrics)]
+    assert exit_code([*run, "--characters", "10"]) == 0
+    assert exit_code(["run", "plaza", "--motions", str(tmp_path), "--seconds", "1"]) == 2
+
+
 def test_labels_choose_what_a_clip_serves(folder, tmp_path, capsys):
     clip = next(path.stem for path in (folder / "clips").iterdir() if path.stem.startswith("a_clip"))
     labels = tmp_path / "labels.toml"

@@ -243,6 +243,30 @@ def test_a_mapping_file_names_what_no_family_does(tmp_path):
         read_mapping(path, names)
 
 
+def test_a_mapping_file_need_only_name_what_names_do_not_tell(tmp_path):
+    path = tmp_path / "map.toml"
+    names = [*LIBRARY.skeleton.joint_names, "Leg1"]
+    names.remove("left_thigh")
+    path.write_text('left_thigh = "Leg1"\nhead = []\nneck = ["neck_1"]\n')
+    found = read_mapping(path, names)
+    assert names[found.joint["left_thigh"]] == "Leg1"
+    assert names[found.joint["right_shank"]] == "right_shank"
+    assert "head" not in found.joint
+    assert [names[joint] for joint in found.chain["neck"]] == ["neck_1"]
+    assert len(found.chain["spine"]) == 4
+    path.write_text('left_shank = "left_foot"\n')
+    with pytest.raises(MotionError, match="lacks required roles; got 'left_thigh, left_foot'"):
+        read_mapping(path, names)
+
+
+def test_told_units_that_make_giants_are_refused():
+    source = as_source(LIBRARY.clip("walk"), units_per_metre=100.0)
+    joints = map_joints(source.skeleton.joint_names, "walk.bvh")
+    assert find_convention(source, joints, units="cm").metres_per_unit == 0.01
+    with pytest.raises(MotionError, match="unbelievable length in m; got '8"):
+        find_convention(source, joints, units="m")
+
+
 def test_units_are_told_when_no_unit_gives_a_human_leg():
     source = as_source(LIBRARY.clip("walk"), units_per_metre=1e-6)
     joints = map_joints(source.skeleton.joint_names, "tiny.bvh")

@@ -113,6 +113,15 @@ def unit_of(motion: SourceMotion, leg: float, units: str | None) -> tuple[float,
     if units is not None:
         if units not in UNITS:
             raise MotionError(describe("--units", "is no unit", units, ", ".join(UNITS)))
+        if math.isfinite(leg) and not LEG_RANGE[0] <= leg * UNITS[units] <= LEG_RANGE[1]:
+            raise MotionError(
+                describe(
+                    f"{motion.path}: skeleton",
+                    f"has a leg of unbelievable length in {units}",
+                    f"{leg * UNITS[units]:.3g} m",
+                    f"{LEG_RANGE[0]} to {LEG_RANGE[1]} m",
+                )
+            )
         return UNITS[units], f"{units} (as told)"
     if not (math.isfinite(leg) and leg > 0.0):
         raise MotionError(describe(f"{motion.path}: skeleton", "the leg has no length"))

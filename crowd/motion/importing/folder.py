@@ -12,6 +12,8 @@ from crowd.motion.formats import find_motion_files, read_motions
 from crowd.motion.importing.example_set import ExampleSet, assemble
 from crowd.motion.importing.importer import Imported, ImportSettings, import_clip
 from crowd.motion.importing.labels import FILE_NAME, Correction, check_names, read_labels
+from crowd.motion.library import MotionLibrary
+from crowd.motion.library_file import load_library
 
 LICENCE_PATTERNS = ("LICENSE*", "LICENCE*", "COPYING*", "NOTICE*", "license*", "licence*")
 FOLDERS_UP = 2
@@ -130,6 +132,19 @@ def import_motions(request: Request, on_file: Callable[[int, int, str], None] | 
     clips = [entry.clip for entry in imported]
     examples = assemble(clips, request.name, source, licence, unmirrored, request.fills)
     return ImportReport(tuple(imported), tuple(unusable), examples)
+
+
+def load_or_import(path: Path) -> MotionLibrary:
+    """Load a library, or import a folder of motion files, with the labels beside them.
+
+    Raises
+    ------
+    MotionError
+        It is neither.
+    """
+    if path.is_dir():
+        return import_motions(Request([path], path.name)).examples.library
+    return load_library(path)
 
 
 def _labels_beside(folder: Path) -> Mapping[str, Correction]:

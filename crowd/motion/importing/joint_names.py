@@ -349,24 +349,31 @@ def map_joints(names: Sequence[str], where: str) -> JointMap:
     MotionError
         No family names all of `REQUIRED`; the nearest family and the nearest names are told.
     """
+    family, joint, chain = nearest_family(names)
+    missing = [role for role in REQUIRED if role not in joint]
+    if missing:
+        wanted = family.spellings()[missing[0]][0]
+        raise MotionError(
+            describe(
+                f"{where}: joint names",
+                f"no joint for {', '.join(missing)} (nearest family: {family.name}); "
+                "name them in a mapping file, see --joints",
+                allowed=f"like {nearest_first(wanted, names)}",
+            )
+        )
+    return joint_map(family.name, names, joint, chain)
+
+
+def nearest_family(
+    names: Sequence[str],
+) -> tuple[NamingFamily, dict[str, int], dict[str, tuple[int, ...]]]:
+    """The naming family that knows most of some joints, with the joints and chains that it knows."""
     place: dict[str, int] = {}
     for index, name in enumerate(names):
         place.setdefault(normalised(name), index)
     found = [match_family(family, place) for family in FAMILIES]
     best = max(range(len(FAMILIES)), key=lambda k: coverage(*found[k]))
-    joint, chain = found[best]
-    missing = [role for role in REQUIRED if role not in joint]
-    if missing:
-        wanted = FAMILIES[best].spellings()[missing[0]][0]
-        raise MotionError(
-            describe(
-                f"{where}: joint names",
-                f"no joint for {', '.join(missing)} (nearest family: {FAMILIES[best].name}); "
-                "name them in a mapping file, see --joints",
-                allowed=f"like {nearest_first(wanted, names)}",
-            )
-        )
-    return joint_map(FAMILIES[best].name, names, joint, chain)
+    return FAMILIES[best], *found[best]
 
 
 def match_family(
@@ -403,7 +410,9 @@ def joint_map(
 def read_mapping(path: Path, names: Sequence[str]) -> JointMap:
     """Read a mapping file: TOML with one line for each role.
 
-    ``left_thigh = "Leg1_L"``; chains are lists from the pelvis up, ``spine = ["Low", "High"]``.
+    ``left_thigh = "Leg1_L"``; chains are lists from the pelvis up, ``spine = ["Low", "High"]``. Roles that
+    the file leaves out are recognised by their names, as far as a naming family knows them;
+    ``head = []`` says that there is no head.
 
     Raises
     ------
@@ -415,22 +424,24 @@ def read_mapping(path: Path, names: Sequence[str]) -> JointMap:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise MotionError(describe(str(path), "is not a mapping file", str(error))) from error
     place = {name: index for index, name in enumerate(names)}
-    joint: dict[str, int] = {}
-    chain: dict[str, tuple[int, ...]] = {}
+    told: dict[str, tuple[int, ...]] = {}
     for role, value in table.items():
         if role not in ROLES:
             raise MotionError(describe(f"{path}: {role}", "is no role", role, nearest_first(role, ROLES)))
         listed = value if isinstance(value, list) else [value]
-        if role not in CHAINS and len(listed) != 1:
+        if role not in CHAINS and len(listed) > 1:
             raise MotionError(describe(f"{path}: {role}", "takes one joint", value))
         for name in listed:
             if name not in place:
                 known = nearest_first(str(name), names)
                 raise MotionError(describe(f"{path}: {role}", "the skeleton has no such joint", name, known))
-        if role in CHAINS:
-            chain[role] = tuple(place[name] for name in listed)
-        else:
-            joint[role] = place[listed[0]]
+        told[role] = tuple(place[name] for name in listed)
+    taken = set().union(*told.values())
+    _, joint, chain = nearest_family(names)
+    joint = {role: index for role, index in joint.items() if role not in told and index not in taken}
+    chain = {role: tuple(index for index in found if index not in taken) for role, found in chain.items()}
+    chain |= {role: found for role, found in told.items() if role in CHAINS}
+    joint |= {role: found[0] for role, found in told.items() if role not in CHAINS and found}
     missing = [role for role in REQUIRED if role not in joint]
     if missing:
         raise MotionError(describe(str(path), "lacks required roles", ", ".join(missing)))
