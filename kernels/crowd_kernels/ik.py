@@ -25,9 +25,9 @@ from crowd_kernels.ik_rows import (
     IS_FAR,
     JOINT_ROW,
     LENGTH,
-    MISS,
     PLACE,
     POINT,
+    PUSH,
     REFERENCE,
     ROTATION,
     TARGET,
@@ -37,13 +37,10 @@ from crowd_kernels.ik_rows import (
     accumulate_cross_row,
     accumulate_frame_row,
     accumulate_place_row,
-    activity_row,
-    add_force_row,
     add_row,
     add_torque_row,
     clear_row,
     commit_row,
-    damping_row,
     divide_block,
     effector_row,
     factor_block,
@@ -64,9 +61,8 @@ from crowd_kernels.ik_rows import (
     start_step_row,
     step_row,
     subtract_block,
-    subtract_frame_drift_row,
+    subtract_drift_row,
     subtract_lower,
-    subtract_place_drift_row,
     subtract_upper,
     sum_row,
 )
@@ -154,6 +150,10 @@ class SolveSettings(NamedTuple):
     """Largest turn of an effector in one iteration, rad."""
     reach: float
     """Share of a chain's length within which targets are sought."""
+    place_first: int
+    """Iterations in which rotations wait for effectors that are farther than `waiting_distance`."""
+    waiting_distance: float
+    """See `place_first`, m."""
     distance_tolerance: float
     """Distance at which a target is reached, m."""
     angle_tolerance: float
@@ -176,6 +176,8 @@ SETTINGS = SolveSettings(
     place_step=0.2,
     turn_step=0.5,
     reach=0.995,
+    place_first=6,
+    waiting_distance=0.03,
     distance_tolerance=1e-3,
     angle_tolerance=0.0174533,
     least_iterations=0,
@@ -304,9 +306,16 @@ def effector_at(effectors: Any, e: int) -> Any:
 
 
 @inlined_kernel
-def push_at(push: Any, row: int) -> Any:
-    """Find three elements of the right side or the solution."""
-    return push[row * 3 * LANES : (row + 1) * 3 * LANES]
+def push_at(push: Any, e: int) -> Any:
+    """Find what belongs to an effector in the right side or the solution."""
+    return push[e * PUSH : (e + 1) * PUSH]
+
+
+@inlined_kernel
+def part_at(push: Any, row: int, parts: int) -> Any:
+    """Find the three elements of the right side or the solution that belong to a row of blocks."""
+    begin = row // parts * PUSH + row % parts * 3 * LANES
+    return push[begin : begin + 3 * LANES]
 
 
 @inlined_kernel
@@ -317,18 +326,20 @@ def block_at(system: Any, row: int, column: int) -> Any:
 
 
 @kernel
-def solve_system(count: int, damping: Any, system: Any, out_push: Any) -> None:
+def solve_system(count: int, parts: int, damping: Any, system: Any, out_push: Any) -> None:
     """Solve the system by Cholesky in blocks of 3 rows.
 
     Parameters
     ----------
     count : int
         Rows of blocks.
+    parts : int
+        Rows of blocks of an effector: 1 position, 2 position and rotation.
     damping : (16,) float32
         Added to the diagonal.
     system : (count * (count + 1) / 2 * 144,) float32
         Blocks of the lower triangle, replaced by the factor.
-    out_push : (count * 48,) float32
+    out_push : (E * PUSH,) float32
         In: the right side. Out: the solution.
     """
     for row in range(count):
@@ -347,12 +358,16 @@ def solve_system(count: int, damping: Any, system: Any, out_push: Any) -> None:
         factor_block(damping, block_at(system, row, row))
     for row in range(count):
         for column in range(row):
-            subtract_lower(block_at(system, row, column), push_at(out_push, column), push_at(out_push, row))
-        solve_lower(block_at(system, row, row), push_at(out_push, row))
+            subtract_lower(
+                block_at(system, row, column), part_at(out_push, column, parts), part_at(out_push, row, parts)
+            )
+        solve_lower(block_at(system, row, row), part_at(out_push, row, parts))
     for row in range(count - 1, -1, -1):
         for column in range(row + 1, count):
-            subtract_upper(block_at(system, column, row), push_at(out_push, column), push_at(out_push, row))
-        solve_upper(block_at(system, row, row), push_at(out_push, row))
+            subtract_upper(
+                block_at(system, column, row), part_at(out_push, column, parts), part_at(out_push, row, parts)
+            )
+        solve_upper(block_at(system, row, row), part_at(out_push, row, parts))
 
 
 @kernel
@@ -413,6 +428,7 @@ def free_joints(tree: TreeArrays, settings: SolveSettings, joints: Any) -> None:
                 if tree.is_free[k, axis] == ZERO:
                     lock_axis_row(
                         joints[above : above + JOINT_ROW],
+                        tree.weight[k],
                         frame_of(tree.parent_frame, k),
                         frame_of(tree.joint_frame, k),
                         axis,
@@ -436,28 +452,19 @@ def build_system(
     effectors : (E * EFFECTOR_ROW,) float32
     out_system : (E * parts * (E * parts + 1) / 2 * 144,) float32
         Blocks of the lower triangle.
-    out_push : (E * parts * 48,) float32
+    out_push : (E * PUSH,) float32
         Right side.
     """
     root_weight = np.float32(tree.root_weight)
     for index in range(out_system.shape[0]):
         out_system[index] = ZERO
     for a in range(tree.effector.shape[0]):
-        for part in range(parts):
-            start_push_row(
-                effectors[a * EFFECTOR_ROW + MISS + part * 3 * LANES :], push_at(out_push, a * parts + part)
-            )
+        start_push_row(effector_at(effectors, a), push_at(out_push, a))
         if root_weight > ZERO:
-            root_subtract_row(joint_at(joints, -1), effector_at(effectors, a), push_at(out_push, a * parts))
+            root_subtract_row(joint_at(joints, -1), effector_at(effectors, a), push_at(out_push, a))
         for k in range(tree.joint.shape[0]):
             if tree.moves[a, k]:
-                subtract_place_drift_row(
-                    joint_at(joints, k), effector_at(effectors, a), push_at(out_push, a * parts)
-                )
-                if parts == 2:
-                    subtract_frame_drift_row(
-                        joint_at(joints, k), effector_at(effectors, a), push_at(out_push, 2 * a + 1)
-                    )
+                subtract_drift_row(joint_at(joints, k), effector_at(effectors, a), push_at(out_push, a))
         for b in range(a + 1):
             if root_weight > ZERO:
                 root_accumulate_row(
@@ -495,19 +502,17 @@ def build_system(
 
 @kernel
 def turn_joints(
-    tree: TreeArrays, parts: int, joints: Any, effectors: Any, push: Any, running: Any, out_violations: Any
+    tree: TreeArrays, joints: Any, effectors: Any, push: Any, running: Any, out_violations: Any
 ) -> None:
     """Find the next rotations of all joints, and fix those that would leave their limits.
 
     Parameters
     ----------
     tree : TreeArrays
-    parts : int
-        Rows of blocks of an effector: 1 position, 2 position and rotation.
     joints : ((K + 1) * JOINT_ROW,) float32
         The root and all joints.
     effectors : (E * EFFECTOR_ROW,) float32
-    push : (E * parts * 48,) float32
+    push : (E * PUSH,) float32
         Solution of the system.
     running : (16,) float32
         0 where the character stays as it is.
@@ -521,13 +526,12 @@ def turn_joints(
         start_step_row(joint_at(joints, k))
         for e in range(tree.effector.shape[0]):
             if tree.moves[e, k]:
-                add_force_row(effector_at(effectors, e), push_at(push, e * parts), joint_at(joints, k))
-                if parts == 2:
-                    add_torque_row(effector_at(effectors, e), push_at(push, 2 * e + 1), joint_at(joints, k))
+                add_torque_row(effector_at(effectors, e), push_at(push, e), joint_at(joints, k))
         step_row(joint_at(joints, tree.parent[k]), running, joint_at(joints, k))
         if tree.is_limited[k]:
             limit_row(
                 joint_at(joints, tree.parent[k]),
+                tree.weight[k],
                 frame_of(tree.parent_frame, k),
                 frame_of(tree.joint_frame, k),
                 tree.inverse_swing[k, 0],
@@ -572,7 +576,7 @@ def solve_block(
     effectors : (E * EFFECTOR_ROW,) float32
     system : (E * (2 * E + 1) * 144,) float32
         Scratch.
-    push : (E * 96,) float32
+    push : (E * PUSH,) float32
         Scratch.
     control : (5 * 16,) float32
         Scratch.
@@ -580,11 +584,12 @@ def solve_block(
         Iterations made, and iterations without progress.
     """
     count = tree.effector.shape[0]
+    totals = control[: 3 * LANES]
     error = control[:LANES]
     missing = control[LANES : 2 * LANES]
-    best = control[2 * LANES : 3 * LANES]
-    running = control[3 * LANES : 4 * LANES]
-    damping = control[4 * LANES : 5 * LANES]
+    damping = control[2 * LANES : 3 * LANES]
+    best = control[3 * LANES : 4 * LANES]
+    running = control[4 * LANES : 5 * LANES]
     iterations = out_iterations[:LANES]
     stalled = out_iterations[LANES : 2 * LANES]
     root_weight = np.float32(tree.root_weight)
@@ -600,23 +605,19 @@ def solve_block(
             error[lane] = ZERO
             missing[lane] = ZERO
             damping[lane] = np.float32(settings.damping * settings.damping)
+        waiting = np.float32(settings.waiting_distance) if iteration < settings.place_first else FAR
         for e in range(count):
             effector_row(
                 joint_at(joints, tree.effector[e]),
                 joint_at(joints, tree.base[e]),
                 np.float32(settings.reach),
-                np.float32(settings.place_step),
-                np.float32(settings.turn_step),
+                (np.float32(settings.place_step), np.float32(settings.turn_step)),
+                waiting,
+                (np.float32(settings.distance_tolerance), np.float32(settings.angle_tolerance)),
+                np.float32(settings.error_damping),
                 effector_at(effectors, e),
+                totals,
             )
-            activity_row(
-                effector_at(effectors, e),
-                np.float32(settings.distance_tolerance),
-                np.float32(settings.angle_tolerance),
-                error,
-                missing,
-            )
-            damping_row(effector_at(effectors, e), np.float32(settings.error_damping), damping)
         is_early = ONE if iteration < settings.least_iterations else ZERO
         running_row(error, missing, is_early, np.float32(settings.patience), best, stalled, running)
         if sum_row(running) == ZERO or iteration == settings.most_iterations:
@@ -632,8 +633,8 @@ def solve_block(
                     joint_at(joints, -1),
                 )
             build_system(tree, parts, joints, effectors, system[:used], push)
-            solve_system(parts * count, damping, system, push)
-            turn_joints(tree, parts, joints, effectors, push, running, error)
+            solve_system(parts * count, parts, damping, system, push)
+            turn_joints(tree, joints, effectors, push, running, error)
             if sum_row(error) == ZERO:
                 break
         for k in range(tree.joint.shape[0]):
@@ -641,9 +642,7 @@ def solve_block(
                 commit_row(joint_at(joints, k))
         if root_weight > ZERO:
             for e in range(count):
-                root_push_row(
-                    effector_at(effectors, e), push_at(push, e * parts), root_weight, joint_at(joints, -1)
-                )
+                root_push_row(effector_at(effectors, e), push_at(push, e), root_weight, joint_at(joints, -1))
             root_commit_row(running, joint_at(joints, -1))
 
 

@@ -69,8 +69,12 @@ LENGTH = 23 * LANES
 """Length of the chain that can bring the point to the target, m."""
 IS_FAR = 24 * LANES
 """1 where the target lies beyond that length."""
-EFFECTOR_ROW = 25 * LANES
+TURNS = 25 * LANES
+"""1 where the rotation is sought in this iteration, else 0."""
+EFFECTOR_ROW = 26 * LANES
 
+PUSH = 6 * LANES
+"""Right side of the system at an effector, and then its solution: 3 for the position, 3 for the rotation."""
 BLOCK = 9 * LANES
 """A block of the system, 3 rows and 3 columns."""
 
@@ -80,8 +84,8 @@ HALF: Any = np.float32(0.5)
 TWO: Any = np.float32(2.0)
 TINY: Any = np.float32(1e-12)
 LEAST_PIVOT: Any = np.float32(1e-9)
-FREE_SHARE: Any = np.float32(1e-4)
-SLACK: Any = np.float32(1e-6)
+FREE_SHARE: Any = np.float32(1e-3)
+SLACK: Any = np.float32(2e-5)
 SIXTH: Any = np.float32(1.0 / 6.0)
 ASIN_FIFTH: Any = np.float32(0.075)
 ANGLE_LENGTH: Any = np.float32(0.3)
@@ -198,7 +202,7 @@ def pull_row(above: Any, weight: Any, gain: Any, bound: Any, row: Any) -> None:
 
 
 @inlined_kernel
-def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, share: Any) -> None:
+def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, weight: Any, share: Any) -> None:
     """Let a joint turn along one direction by a given amount, whatever the torque.
 
     Parameters
@@ -210,11 +214,13 @@ def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, share: Any) 
         The direction, of any length, root frame.
     motion : float32
         Scalar product of the normal and the rotation vector that is wanted.
+    weight : float32
+        How easily the joint turns while nothing is fixed. A direction that has hardly any of it left is
+        fixed already.
     share : float32
         1 to do it, 0 to leave the joint as it is.
     """
     first = MOBILITY + lane
-    weight = row[first] + row[first + 3 * LANES] + row[first + 5 * LANES]
     mx, my, mz = moved(row, lane, normal)
     pivot = normal[0] * mx + normal[1] * my + normal[2] * mz
     least = FREE_SHARE * weight * dot(normal, normal) + TINY
@@ -261,13 +267,17 @@ def hold_reference_row(
 
 
 @inlined_kernel
-def lock_axis_row(above: Any, parent_frame: Quaternion, joint_frame: Quaternion, axis: int, row: Any) -> None:
+def lock_axis_row(
+    above: Any, weight: Any, parent_frame: Quaternion, joint_frame: Quaternion, axis: int, row: Any
+) -> None:
     """Take one axis of a joint out of its mobility and drift.
 
     Parameters
     ----------
     above : (JOINT_ROW,) float32
         The parent.
+    weight : float32
+        How easily the joint turns.
     parent_frame, joint_frame : tuple of float32
     axis : int
         0 swing about x, 1 swing about y, 2 twist.
@@ -289,11 +299,21 @@ def lock_axis_row(above: Any, parent_frame: Quaternion, joint_frame: Quaternion,
                 swing[2] + twisting * (twist[2] - swing[2]),
             ),
         )
-        fix_direction(row, lane, normal, ZERO, ONE)
+        fix_direction(row, lane, normal, ZERO, weight, ONE)
 
 
 @inlined_kernel
-def effector_row(joint: Any, base: Any, clamp: Any, place_step: Any, turn_step: Any, row: Any) -> None:
+def effector_row(
+    joint: Any,
+    base: Any,
+    clamp: Any,
+    steps: Any,
+    waiting_distance: Any,
+    tolerances: Any,
+    damping: Any,
+    row: Any,
+    out_totals: Any,
+) -> None:
     """Find where an effector is and what is missing to its target.
 
     Parameters
@@ -304,10 +324,19 @@ def effector_row(joint: Any, base: Any, clamp: Any, place_step: Any, turn_step: 
         The first joint of its chain that can turn.
     clamp : float32
         Share of the chain's length within which targets are sought.
-    place_step, turn_step : float32
+    steps : tuple of float32
         Largest step, m and rad.
+    waiting_distance : float32
+        Distance beyond which the rotation waits for the position, m.
+    tolerances : tuple of float32
+        What counts as reached, m and rad.
+    damping : float32
+        Share of the square of the position step that is added to the damping.
     row : (EFFECTOR_ROW,) float32
-        The effector: tip, miss, distance, angle and `IS_FAR` are written.
+        The effector: tip, miss, distance, angle, `IS_FAR` and `TURNS` are written.
+    out_totals : (48,) float32
+        Sums over effectors, in and out: error (distances and 0.3 m per rad of the angles), number of
+        effectors that are not at their targets, damping in m^2.
     """
     for lane in range(LANES):
         frame = quaternion_at(joint, FRAME, lane)
@@ -327,10 +356,12 @@ def effector_row(joint: Any, base: Any, clamp: Any, place_step: Any, turn_step: 
             wants * (origin[1] + way[1] * share - tip[1]),
             wants * (origin[2] + way[2] * share - tip[2]),
         )
-        distance = np.sqrt(dot(miss, miss) + TINY)
+        square = dot(miss, miss)
+        distance = np.sqrt(square + TINY)
         row[DISTANCE + lane] = distance
-        share = min(ONE, place_step / distance)
+        share = min(ONE, steps[0] / distance)
         put_vector(row, MISS, lane, (miss[0] * share, miss[1] * share, miss[2] * share))
+        out_totals[2 * LANES + lane] += damping * square * share * share
         turn = multiply(quaternion_at(row, TARGET_FRAME, lane), conjugate(frame))
         square = turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]
         # The angle is twice the arc sine of the vector part.
@@ -338,45 +369,41 @@ def effector_row(joint: Any, base: Any, clamp: Any, place_step: Any, turn_step: 
         factor = factor if turn[0] >= ZERO else -factor
         angle = np.sqrt(factor * factor * square + TINY)
         row[ANGLE + lane] = angle
-        share = factor * min(ONE, turn_step / angle)
+        turns = row[WANTS_FRAME + lane] * (ONE - wants * (ONE if distance > waiting_distance else ZERO))
+        row[TURNS + lane] = turns
+        share = turns * factor * min(ONE, steps[1] / angle)
         put_vector(row, MISS + 3 * LANES, lane, (turn[1] * share, turn[2] * share, turn[3] * share))
+        out_totals[lane] += distance + ANGLE_LENGTH * angle
+        is_there = (distance < tolerances[0]) & (angle < tolerances[1])
+        out_totals[LANES + lane] += ZERO if is_there else ONE
 
 
 @inlined_kernel
-def subtract_place_drift_row(joint: Any, effector: Any, out_right: Any) -> None:
-    """Take away from an effector's step what the drift of a joint already moves it.
+def subtract_drift_row(joint: Any, effector: Any, out_push: Any) -> None:
+    """Take away from an effector's step what the drift of a joint already does.
 
     Parameters
     ----------
     joint : (JOINT_ROW,) float32
     effector : (EFFECTOR_ROW,) float32
-    out_right : (48,) float32
-        Right side of the system at the effector's position, in and out.
+    out_push : (PUSH,) float32
+        Right side of the system at the effector, in and out.
     """
     for lane in range(LANES):
+        drift = vector_at(joint, DRIFT, lane)
         lever = subtract(vector_at(effector, TIP, lane), vector_at(joint, PLACE, lane))
-        x, y, z = cross(vector_at(joint, DRIFT, lane), lever)
+        x, y, z = cross(drift, lever)
         share = effector[WANTS_PLACE + lane]
-        before = vector_at(out_right, 0, lane)
-        put_vector(out_right, 0, lane, (before[0] - share * x, before[1] - share * y, before[2] - share * z))
-
-
-@inlined_kernel
-def subtract_frame_drift_row(joint: Any, effector: Any, out_right: Any) -> None:
-    """Take away from an effector's turn what the drift of a joint already turns it.
-
-    Parameters
-    ----------
-    joint : (JOINT_ROW,) float32
-    effector : (EFFECTOR_ROW,) float32
-    out_right : (48,) float32
-        Right side of the system at the effector's rotation, in and out.
-    """
-    for lane in range(LANES):
-        x, y, z = vector_at(joint, DRIFT, lane)
-        share = effector[WANTS_FRAME + lane]
-        before = vector_at(out_right, 0, lane)
-        put_vector(out_right, 0, lane, (before[0] - share * x, before[1] - share * y, before[2] - share * z))
+        place = vector_at(out_push, 0, lane)
+        put_vector(out_push, 0, lane, (place[0] - share * x, place[1] - share * y, place[2] - share * z))
+        share = effector[TURNS + lane]
+        turn = vector_at(out_push, 3 * LANES, lane)
+        put_vector(
+            out_push,
+            3 * LANES,
+            lane,
+            (turn[0] - share * drift[0], turn[1] - share * drift[1], turn[2] - share * drift[2]),
+        )
 
 
 @inlined_kernel
@@ -433,7 +460,7 @@ def accumulate_frame_row(joint: Any, a: Any, b: Any, out_blocks: Any) -> None:
     """
     for lane in range(LANES):
         other = subtract(vector_at(b, TIP, lane), vector_at(joint, PLACE, lane))
-        frame = a[WANTS_FRAME + lane]
+        frame = a[TURNS + lane]
         mx, my, mz = mobility_at(joint, lane)
         x, y, z = cross(mx, other), cross(my, other), cross(mz, other)
         share = frame * b[WANTS_PLACE + lane]
@@ -446,7 +473,7 @@ def accumulate_frame_row(joint: Any, a: Any, b: Any, out_blocks: Any) -> None:
         out_blocks[6 * LANES + lane] += share * z[0]
         out_blocks[7 * LANES + lane] += share * z[1]
         out_blocks[8 * LANES + lane] += share * z[2]
-        share = frame * b[WANTS_FRAME + lane]
+        share = frame * b[TURNS + lane]
         out_blocks[9 * LANES + lane] += share * mx[0]
         out_blocks[10 * LANES + lane] += share * mx[1]
         out_blocks[11 * LANES + lane] += share * mx[2]
@@ -472,7 +499,7 @@ def accumulate_cross_row(joint: Any, a: Any, b: Any, out_block: Any) -> None:
     """
     for lane in range(LANES):
         lever = subtract(vector_at(a, TIP, lane), vector_at(joint, PLACE, lane))
-        share = a[WANTS_PLACE + lane] * b[WANTS_FRAME + lane]
+        share = a[WANTS_PLACE + lane] * b[TURNS + lane]
         mx, my, mz = mobility_at(joint, lane)
         x, y, z = cross(mx, lever), cross(my, lever), cross(mz, lever)
         out_block[lane] += share * x[0]
@@ -664,49 +691,32 @@ def start_step_row(joint: Any) -> None:
 
 
 @inlined_kernel
-def add_force_row(effector: Any, force: Any, joint: Any) -> None:
-    """Add the torque that a force at an effector gives a joint to what stands in its step.
+def add_torque_row(effector: Any, push: Any, joint: Any) -> None:
+    """Add the torque that an effector's push gives a joint to what stands in its step.
 
     Parameters
     ----------
     effector : (EFFECTOR_ROW,) float32
-    force : (48,) float32
+    push : (PUSH,) float32
+        Force and torque at the effector.
     joint : (JOINT_ROW,) float32
         The joint: its step is changed.
     """
     for lane in range(LANES):
-        share = effector[WANTS_PLACE + lane]
         lever = subtract(vector_at(effector, TIP, lane), vector_at(joint, PLACE, lane))
-        x, y, z = cross(lever, vector_at(force, 0, lane))
+        x, y, z = cross(lever, vector_at(push, 0, lane))
+        turn = vector_at(push, 3 * LANES, lane)
+        place, frame = effector[WANTS_PLACE + lane], effector[TURNS + lane]
         torque = vector_at(joint, STEP, lane)
         put_vector(
             joint,
             STEP,
             lane,
-            (torque[0] + share * x, torque[1] + share * y, torque[2] + share * z),
-        )
-
-
-@inlined_kernel
-def add_torque_row(effector: Any, torque: Any, joint: Any) -> None:
-    """Add the torque at an effector to what stands in a joint's step.
-
-    Parameters
-    ----------
-    effector : (EFFECTOR_ROW,) float32
-    torque : (48,) float32
-    joint : (JOINT_ROW,) float32
-        The joint: its step is changed.
-    """
-    for lane in range(LANES):
-        share = effector[WANTS_FRAME + lane]
-        x, y, z = vector_at(torque, 0, lane)
-        before = vector_at(joint, STEP, lane)
-        put_vector(
-            joint,
-            STEP,
-            lane,
-            (before[0] + share * x, before[1] + share * y, before[2] + share * z),
+            (
+                torque[0] + place * x + frame * turn[0],
+                torque[1] + place * y + frame * turn[1],
+                torque[2] + place * z + frame * turn[2],
+            ),
         )
 
 
@@ -743,6 +753,7 @@ def step_row(above: Any, is_running: Any, row: Any) -> None:
 @inlined_kernel
 def limit_row(
     above: Any,
+    weight: Any,
     parent_frame: Quaternion,
     joint_frame: Quaternion,
     inverse_x: Any,
@@ -760,6 +771,8 @@ def limit_row(
     ----------
     above : (JOINT_ROW,) float32
         The parent.
+    weight : float32
+        How easily the joint turns.
     parent_frame, joint_frame : tuple of float32
     inverse_x, inverse_y : float32
         See `LimitArrays.inverse_swing`.
@@ -813,9 +826,9 @@ def limit_row(
         motion = rotate(outer, (way[1] * scale, way[2] * scale, way[3] * scale))
         frame = multiply(outer, parent_frame)
         normal = rotate(frame, swing_normal(x, y, x * inverse_x * inverse_x, y * inverse_y * inverse_y))
-        fix_direction(row, lane, normal, dot(normal, motion), swings_out)
+        fix_direction(row, lane, normal, dot(normal, motion), weight, swings_out)
         normal = rotate(frame, twist_normal(x, y))
-        fix_direction(row, lane, normal, dot(normal, motion), twists_out)
+        fix_direction(row, lane, normal, dot(normal, motion), weight, twists_out)
         out_violations[lane] += swings_out + twists_out
 
 
@@ -828,8 +841,9 @@ def commit_row(row: Any) -> None:
     row : (JOINT_ROW,) float32
         The joint.
     """
-    for lane in range(LANES):
-        put_quaternion(row, ROTATION, lane, quaternion_at(row, NEXT, lane))
+    # One long loop: short ones are unrolled and stay scalar.
+    for index in range(4 * LANES):
+        row[ROTATION + index] = row[NEXT + index]
 
 
 @inlined_kernel
@@ -860,26 +874,6 @@ def add_row(values: Any, out: Any) -> None:
 
 
 @inlined_kernel
-def activity_row(effector: Any, distance: Any, angle: Any, out_error: Any, out_missing: Any) -> None:
-    """Add an effector to the error of its characters.
-
-    Parameters
-    ----------
-    effector : (EFFECTOR_ROW,) float32
-    distance, angle : float32
-        What counts as reached, m and rad.
-    out_error : (16,) float32
-        Sum of distances and of 0.3 m per rad of the angles, in and out.
-    out_missing : (16,) float32
-        Number of effectors that are not at their targets, in and out.
-    """
-    for lane in range(LANES):
-        far, turned = effector[DISTANCE + lane], effector[ANGLE + lane]
-        out_error[lane] += far + ANGLE_LENGTH * turned
-        out_missing[lane] += ZERO if (far < distance) & (turned < angle) else ONE
-
-
-@inlined_kernel
 def running_row(
     error: Any, missing: Any, is_early: Any, patience: Any, best: Any, stalled: Any, out_running: Any
 ) -> None:
@@ -888,7 +882,7 @@ def running_row(
     Parameters
     ----------
     error, missing : (16,) float32
-        See `activity_row`.
+        See `effector_row`.
     is_early : float32
         1 while everyone takes steps, reached or not.
     patience : float32
@@ -904,23 +898,6 @@ def running_row(
         stalled[lane] = ZERO if is_better else stalled[lane] + ONE
         goes_on = ONE if (missing[lane] > HALF) & (stalled[lane] <= patience) else ZERO
         out_running[lane] *= max(goes_on, is_early)
-
-
-@inlined_kernel
-def damping_row(effector: Any, share: Any, out_damping: Any) -> None:
-    """Damp more while the effector is far from its target.
-
-    Parameters
-    ----------
-    effector : (EFFECTOR_ROW,) float32
-    share : float32
-        Of the square of the position step.
-    out_damping : (16,) float32
-        In and out, m^2.
-    """
-    for lane in range(LANES):
-        miss = vector_at(effector, MISS, lane)
-        out_damping[lane] += share * dot(miss, miss)
 
 
 @inlined_kernel
@@ -1038,15 +1015,14 @@ def sum_row(row: Any) -> Any:
 
 
 @inlined_kernel
-def start_push_row(miss: Any, out_push: Any) -> None:
+def start_push_row(effector: Any, out_push: Any) -> None:
     """Begin the right side with what is missing.
 
     Parameters
     ----------
-    miss : (>= 48,) float32
-        Step wanted of an effector.
-    out_push : (48,) float32
+    effector : (EFFECTOR_ROW,) float32
+    out_push : (PUSH,) float32
         Written.
     """
-    for lane in range(LANES):
-        put_vector(out_push, 0, lane, vector_at(miss, 0, lane))
+    for index in range(PUSH):
+        out_push[index] = effector[MISS + index]

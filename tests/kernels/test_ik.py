@@ -140,19 +140,21 @@ def crowd_of(tree, rng, count):
 
 
 @pytest.mark.parametrize("task", [1, 2, 3])
-@pytest.mark.parametrize("is_limited", [False])
+@pytest.mark.parametrize("is_limited", [False, True])
 @pytest.mark.parametrize("make", [arm, both_arms])
-def test_one_iteration_matches_the_slow_twin(rng, make, is_limited, task):
+@pytest.mark.parametrize("place_first", [0, 1])
+def test_one_iteration_matches_the_slow_twin(rng, place_first, make, is_limited, task):
     tree = make(is_limited=is_limited)
     crowd = crowd_of(tree, rng, 24)
     start = np.array([random_pose(tree, rng) for _ in range(24)])
     crowd.pose = crowd.rows(start)
     crowd.reference = crowd.rows(np.tile(resting(tree), (24, 1, 1)))
     crowd.task[:] = task
-    crowd.solve(most_iterations=1)
+    settings = SETTINGS._replace(most_iterations=1, place_first=place_first)
+    crowd.solve(**settings._asdict())
     for character, got in enumerate(crowd.local()):
         wanted = oracle.iterate(
-            tree, SETTINGS, start[character], resting(tree), crowd.point[character],
+            tree, settings, start[character], resting(tree), crowd.point[character],
             crowd.target[character], crowd.target_rotation[character], crowd.task[character],
         )  # fmt: skip
         for k in np.flatnonzero(tree.weight > 0):
@@ -160,12 +162,22 @@ def test_one_iteration_matches_the_slow_twin(rng, make, is_limited, task):
             assert off < 1e-4, (character, k)
 
 
-def test_all_positions_of_poses_in_limits_are_reached(rng):
-    crowd = crowd_of(arm(), rng, 1000)
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_all_positions_of_poses_in_limits_are_reached(rng, side):
+    crowd = crowd_of(arm(side), rng, 1000)
     crowd.task[:] = 1
     crowd.solve()
     assert (crowd.status == REACHED).all()
     assert crowd.errors()[:, 0].max() < 1.05e-3
+    assert max(oracle.violation(crowd.tree, local) for local in crowd.local()) < 1e-5
+
+
+def test_positions_with_rotations_are_reached(rng):
+    crowd = crowd_of(arm(), rng, 1000).solve()
+    errors = crowd.errors()
+    is_reached = (errors[:, 0] < 1.05e-3) & (errors[:, 1] < np.radians(1.05))
+    assert is_reached.mean() >= 0.98
+    assert ((crowd.status[:, 0] == REACHED) == is_reached).mean() > 0.998
     assert max(oracle.violation(crowd.tree, local) for local in crowd.local()) < 1e-5
 
 

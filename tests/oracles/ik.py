@@ -83,6 +83,7 @@ class Motion:
     """What one joint can do in one iteration: a drift, and directions that follow torques."""
 
     def __init__(self, weight, drift):
+        self.weight = weight
         self.mobility = weight * np.eye(3)
         self.drift = drift
 
@@ -90,7 +91,7 @@ class Motion:
         """Take out a direction along which the rotation vector is given."""
         along = self.mobility @ normal
         pivot = normal @ along
-        if pivot <= 1e-4 * np.trace(self.mobility) * (normal @ normal) + 1e-12:
+        if pivot <= 1e-3 * self.weight * (normal @ normal) + 1e-12:
             return
         self.drift = self.drift + along * (motion - normal @ self.drift) / pivot
         self.mobility = self.mobility - np.outer(along, along) / pivot
@@ -111,6 +112,9 @@ def iterate(tree, settings, local, reference, point, target, target_rotation, ta
         origin = places[tree.base[e]]
         goal = origin + clipped(target[e] - origin, settings.reach * length)
         miss[6 * e : 6 * e + 3] = clipped(goal - tips[e], settings.place_step)
+        is_far = np.linalg.norm(goal - tips[e]) > settings.waiting_distance
+        if task[e] & 1 and settings.place_first > 0 and is_far:
+            rows[6 * e + 3 : 6 * e + 6] = False
         turn = (rotation(target_rotation[e]) * frames[carrier].inv()).as_rotvec()
         miss[6 * e + 3 : 6 * e + 6] = clipped(turn, settings.turn_step)
     miss[~rows] = 0
@@ -173,7 +177,9 @@ def inside(limits, k, local, reference):
     bound = max(1.0, np.linalg.norm(held_swing * limits.inverse_swing[k]))
     value = np.linalg.norm(swing * limits.inverse_swing[k])
     free_x, free_y, free_twist = limits.is_free[k]
-    broken = (value > bound * (1 + 5e-7), free_twist > 0 and not low - 1e-6 <= twist <= high + 1e-6)
+    tangents = np.tan(np.array([low, twist, high]) / 2)
+    is_twisted = free_twist > 0 and not tangents[0] - 2e-5 <= tangents[1] <= tangents[2] + 2e-5
+    broken = (value**2 > bound**2 * (1 + 2e-5), is_twisted)
     swing = swing * min(1.0, bound / max(value, 1e-12))
     swing = np.where([free_x > 0, free_y > 0], swing, held_swing)
     twist = np.clip(twist, low, high) if free_twist > 0 else held_twist
