@@ -66,6 +66,43 @@ def frames(
 
 
 @app.command()
+def drawing(
+    characters: Annotated[str, typer.Option(help="Numbers of people, separated by commas.")] = "",
+    json: Annotated[Path | None, typer.Option(help="Write the results.")] = None,
+) -> int:
+    """Pictures per second of crowds without a screen: limbs alone, a window's quality, and the best."""
+    from crowd.bench.drawing import SIZES, measure_drawing, qualities, renderer_name
+    from crowd.bench.machine import describe_machine
+    from crowd.bench.report import write_results
+
+    machine = describe_machine() | {"renderer": renderer_name()}
+    sizes = choose_sizes(characters) or list(SIZES)
+    table = Table(box=None, pad_edge=False)
+    for title in ("quality", "people", "fps", "prepare us/person", "MB", "by level", "ok"):
+        table.add_column(title, justify="left" if title == "quality" else "right", no_wrap=True)
+    results = []
+    for case in qualities():
+        for size in sizes:
+            with Console(stderr=True).status(f"{case}, {size} people"):
+                results.append(measure_drawing(case, size))
+            row = results[-1]
+            table.add_row(
+                row.case,
+                f"{size:,}",
+                f"{row.fps:,.1f}",
+                f"{row.prepare_us_per_character:.2f}",
+                f"{row.upload_mb:.2f}",
+                " ".join(map(str, row.levels)),
+                "yes" if row.ok else f"[red]{row.problem}[/]",
+            )
+    print(", ".join(f"{key} {value}" for key, value in machine.items()))
+    Console(width=120).print(table)
+    if json is not None:
+        write_results(json, [result.as_dict() | {"machine": machine} for result in results])
+    return 0 if all(result.ok for result in results) else EXIT_FAILED
+
+
+@app.command()
 def kernels(
     only: Annotated[str, typer.Option(help="Run cases whose name contains this.")] = "",
 ) -> int:

@@ -89,6 +89,10 @@ def view(
     start: Annotated[float | None, typer.Option(help="Time at which the video begins, s.")] = None,
     stop: Annotated[float | None, typer.Option(help="Time at which the video ends, s.")] = None,
     camera: Annotated[str | None, typer.Option(help='{"eye": [x, y, z], "target": [x, y, z]}, m.')] = None,
+    character: Annotated[
+        list[Path] | None,
+        typer.Option(help="Skinned glTF character for people on trajectories; may be repeated."),
+    ] = None,
     record: Annotated[
         Path | None, typer.Option(help="Keep the recording of the people who walk along trajectories.")
     ] = None,
@@ -99,7 +103,7 @@ def view(
     from crowd.cli.output import require_folder
 
     require_folder("--record", record)
-    with _opened(shown, record) as opened:
+    with _opened(shown, record, character or []) as opened:
         if picture is None and video is None and not is_window:
             return 0
         from crowd_viewer.camera import Camera
@@ -120,7 +124,7 @@ def view(
     return 0
 
 
-def _opened(path: Path, record: Path | None) -> Recording:
+def _opened(path: Path, record: Path | None, character_files: list[Path]) -> Recording:
     """Open a recording; trajectories get bodies first, with a progress bar."""
     from rich.console import Console
     from rich.progress import Progress
@@ -139,4 +143,4 @@ def _opened(path: Path, record: Path | None) -> Recording:
             share = frame.time / max(frame.simulation.seconds, frame.time)
             progress.update(progress.task_ids[0], completed=share)
 
-        return open_recording(path, record=record, on_frame=show)
+        return open_recording(path, record=record, character_files=character_files, on_frame=show)

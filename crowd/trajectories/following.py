@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -67,6 +67,8 @@ class FollowingSimulation(Simulation):
     threads : int, optional
     motions : MotionLibrary, optional
         The built-in library when left out.
+    character_files : sequence of path
+        Skinned glTF characters that people are drawn as.
 
     Notes
     -----
@@ -82,8 +84,15 @@ class FollowingSimulation(Simulation):
         seed: int = 0,
         threads: int | None = None,
         motions: MotionLibrary | None = None,
+        character_files: Sequence[str | os.PathLike[str]] = (),
     ) -> None:
-        super().__init__(scenario_around(trajectories), seed=seed, threads=threads, motions=motions)
+        super().__init__(
+            scenario_around(trajectories),
+            seed=seed,
+            threads=threads,
+            motions=motions,
+            character_files=character_files,
+        )
         self.trajectories = trajectories
         self.navigator = Bystander(self.model, self.navigator.avoidance.settings)
         self.locomotion.settings = LocomotionSettings(command=LIMITS)
@@ -318,6 +327,7 @@ def record_bodies(
     *,
     seed: int = 0,
     motions: MotionLibrary | None = None,
+    character_files: Sequence[str | os.PathLike[str]] = (),
     on_frame: Callable[[Frame], None] = lambda frame: None,
 ) -> FollowingSimulation:
     """Give trajectories bodies, and write a recording of them.
@@ -327,8 +337,8 @@ def record_bodies(
     trajectories : Trajectories
     path : path
         Of the recording; an existing file is replaced.
-    seed : int
-    motions : MotionLibrary, optional
+    seed, motions, character_files
+        As of `FollowingSimulation`.
     on_frame : callable, optional
         Called after each step.
 
@@ -337,7 +347,9 @@ def record_bodies(
     FollowingSimulation
         At its end, with its metrics.
     """
-    simulation = FollowingSimulation(trajectories, seed=seed, motions=motions)
+    simulation = FollowingSimulation(
+        trajectories, seed=seed, motions=motions, character_files=character_files
+    )
     recorder = Recorder(path, simulation)
     try:
         while not simulation.is_finished:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import h5py
@@ -21,6 +21,7 @@ def open_recording(
     shown: str | os.PathLike[str] | Trajectories,
     *,
     record: str | os.PathLike[str] | None = None,
+    character_files: Sequence[str | os.PathLike[str]] = (),
     on_frame: Callable[[Frame], None] = lambda frame: None,
 ) -> Recording:
     """Open a recording; trajectories get bodies first, in a recording of their own.
@@ -31,6 +32,8 @@ def open_recording(
         A recording, or a file that `load_trajectories` reads.
     record : path, optional
         Where to keep the recording of the bodies; it is deleted with the object when left out.
+    character_files : sequence of path
+        Skinned glTF characters as which the bodies of trajectories are drawn.
     on_frame : callable, optional
         Called after each step of the walk along trajectories.
 
@@ -45,11 +48,11 @@ def open_recording(
             return Recording(path)
         shown = load_trajectories(path)
     if record is not None:
-        record_bodies(shown, record, on_frame=on_frame)
+        record_bodies(shown, record, character_files=character_files, on_frame=on_frame)
         return Recording(record)
     folder = tempfile.TemporaryDirectory(prefix="crowd-", ignore_cleanup_errors=True)
     path = Path(folder.name) / "bodies.h5"
-    record_bodies(shown, path, on_frame=on_frame)
+    record_bodies(shown, path, character_files=character_files, on_frame=on_frame)
     recording = Recording(path)
     weakref.finalize(recording, folder.cleanup)
     return recording

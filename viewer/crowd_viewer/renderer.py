@@ -79,7 +79,7 @@ class Renderer:
 
     def draw(self, frame: CrowdFrame, camera: Camera, *, keeps_levels: bool = True) -> None:
         """Draw a frame into `targets.picture`."""
-        self._prepare(frame, camera, keeps_levels=keeps_levels)
+        self.prepare(frame, camera, keeps_levels=keeps_levels)
         if self.light.is_on:
             self._draw_shadows(frame)
         self._draw_colours(frame)
@@ -100,7 +100,7 @@ class Renderer:
         depth : (H, W) float32
             Distance along the camera's axis, m; infinite for the sky.
         """
-        self._prepare(frame, camera, keeps_levels=False)
+        self.prepare(frame, camera, keeps_levels=False)
         context, targets = self.context, self.targets
         self._write_view(self._to_clip)
         targets.use_identity()
@@ -138,7 +138,7 @@ class Renderer:
 
     # ---- passes
 
-    def _prepare(self, frame: CrowdFrame, camera: Camera, *, keeps_levels: bool) -> None:
+    def prepare(self, frame: CrowdFrame, camera: Camera, *, keeps_levels: bool = True) -> None:
         """Compute matrices, and choose and upload who is seen."""
         width, height = self.targets.size
         self.camera = camera
