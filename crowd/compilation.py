@@ -31,6 +31,7 @@ def warm_up(progress: Callable[[str], None] | None = None, *, is_threaded: bool 
     if gestures:
         simulation.commands.play(2, gestures[0].name)
     simulation.commands.look_at(0, character=1)
+    simulation.state.saccade_offset[2] = 0.01
 
     def note(stage: str) -> None:
         if progress is not None:
