@@ -350,3 +350,23 @@ def test_points_between_eyes_agree_with_the_twin(rng):
         wanted = oracle.eye_point(ARRAYS, scale[other], place[other], yaw[other], pose[other], pelvis[other])
         np.testing.assert_allclose(out[character], wanted, atol=1e-5)
     assert np.isnan(out[[4, 6, 7, 8]]).all(), "not there, oneself, no such row"
+
+
+def test_the_head_alone_comes_within_two_degrees(rng):
+    count = 300
+    people = Watchers(count, poses(rng, count, 0.03), GazeSettings(eye_share=1e-6))
+    heading, rise, away = (
+        rng.uniform(-1.4, 1.4, count),
+        rng.uniform(-0.5, 0.5, count),
+        rng.uniform(2, 20, count),
+    )
+    level = away * np.cos(rise)
+    targets = np.stack([level * np.sin(heading), 1.55 + away * np.sin(rise), level * np.cos(heading)], axis=1)
+    people.look(targets)
+    people.run(3.0)
+    for character in range(count):
+        pose, pelvis = people.state.pose_rotation[character], people.state.pose_pelvis[character]
+        chain = oracle.Chain(ARRAYS, people.scale[character], pose, pelvis)
+        rotation, position = chain.head(np.zeros((7, 3)))
+        way = targets[character] - position - rotation @ chain.between
+        assert math.degrees(math.acos(rotation[:, 2] @ way / np.linalg.norm(way))) < 2.0
