@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.case import Case
-from crowd.controllers.gaze import SACCADES, Gaze
+from crowd.controllers.gaze import Gaze
+from crowd.controllers.gaze_settings import SACCADES
 from crowd.motion.body import build_skeleton
 from crowd.motion.skeleton import Segment
 from crowd.navigation.avoidance import Avoidance, AvoidanceSettings

@@ -5,7 +5,8 @@ import pytest
 
 import crowd
 from crowd.bench.sweep import MOST_ACCELERATION_RATIO, largest_acceleration, look_about
-from crowd.controllers.gaze import Gaze, GazeSettings, GlanceSettings
+from crowd.controllers.gaze import Gaze
+from crowd.controllers.gaze_settings import GazeSettings, GlanceSettings
 from crowd.errors import SettingsError
 from crowd.motion.clip import ClipKind
 from crowd.scenario.schema import Area, Character, Goal, Region, Scenario, WorldTable

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crowd.controllers.gaze import Gaze, GazeKey, GazeSettings, gaze_arrays, gaze_limits
+from crowd.controllers.gaze import Gaze
+from crowd.controllers.gaze_settings import GazeKey, GazeSettings, gaze_arrays, gaze_limits
 from crowd.motion.body import build_skeleton
 from crowd.state import State
 from crowd_kernels.gaze import (
@@ -17,8 +18,8 @@ from crowd_kernels.gaze import (
     REFUSED,
     eye_point_crowd,
     gaze_crowd,
-    scratch_length,
 )
+from crowd_kernels.gaze_chain import scratch_length
 from crowd_kernels.polynomial import arc_tangent, sine_cosine
 from tests.oracles import gaze as oracle
 from tests.oracles.pose import matrix, quaternions_to_row, row_to_quaternions

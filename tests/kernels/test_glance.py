@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from crowd.controllers.gaze import GlanceSettings, glance_limits
+from crowd.controllers.gaze_settings import GlanceSettings, glance_limits
 from crowd.navigation.cell_table import CellTable
 from crowd_kernels.glance import CHUNKS, glance_crowd
 from tests.oracles import glance as oracle

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from crowd.controllers.gaze import SACCADES, saccade_modes
+from crowd.controllers.gaze_settings import SACCADES, saccade_modes
 from crowd_kernels.saccade import OFF, offset_eyes_crowd, saccade_crowd
 from tests.oracles import saccade as oracle
 from tests.oracles.pose import matrix, quaternions_to_row, row_to_quaternions
