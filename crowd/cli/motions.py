@@ -155,6 +155,11 @@ def print_report(report: ImportReport) -> None:
     mended = [(entry.clip.name, entry.popped) for entry in report.imported if entry.popped]
     for clip, frames in mended:
         print(f"{clip}: {frames} frames popped and were mended")
+    for entry in report.imported:
+        if entry.in_place:
+            print(
+                f"{entry.clip.name}: in place; the ground glides under its feet at {entry.in_place:.2f} m/s"
+            )
     captured = {entry.clip.name: entry.captured for entry in report.imported}
     print_clips([entry.clip for entry in report.imported], captured)
     twins: dict[str, list[str]] = {}

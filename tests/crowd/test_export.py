@@ -135,7 +135,7 @@ def test_a_crowd_in_usd_has_the_same_joints(plaza, tmp_path):
             found = (joints @ world)[:, 3, :3]
             assert np.abs(found - position[frame]).max() < MOST_WAY
             quaternions = np.array([_rotation_of(matrix) for matrix in joints])
-            assert turn_between(quaternions, rotation[frame]) < 2 * MOST_TURN
+            assert turn_between(quaternions, rotation[frame]) < MOST_TURN
 
 
 def _rotation_of(matrix):

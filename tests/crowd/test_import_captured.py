@@ -4,6 +4,7 @@ The figures are those measured on the same files for the collection that the fil
 """
 
 import math
+import re
 from dataclasses import astuple, replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from crowd.motion.library_file import load_library, save_library
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 SMARTBODY = DATA / "smartbody"
+TABLES = DATA.parent / "reference" / "locomotion-examples.md"
 pytestmark = [
     pytest.mark.skipif(not SMARTBODY.is_dir(), reason="needs the captured motion of ../shared/data"),
     pytest.mark.xdist_group("captured"),
@@ -139,6 +141,47 @@ def test_feet_land_when_the_tables_say(imported, name):
     assert found["RHS"] == pytest.approx(np.array(right) - right[0], abs=0.05)
     expected = np.sort(np.mod(np.array(left) - right[0], clip.duration))
     assert found["LHS"] == pytest.approx(expected, abs=0.05)
+
+
+@pytest.mark.skipif(not TABLES.is_file(), reason="needs the tables of ../shared/reference")
+def test_every_foot_lands_and_lifts_when_the_tables_say(imported):
+    errors = {"strike": [], "leaves": []}
+    for prefix, name, duration, columns in published_contacts():
+        entry = imported.get(f"{prefix}{name}")
+        if entry is None or entry.clip.kind is not ClipKind.LOCOMOTION:
+            continue
+        for foot, stances in enumerate(columns):
+            for begin, end in stances:
+                if end - begin < 0.08:
+                    continue
+
+                def away(time, other, period=duration):
+                    return abs(math.remainder(time - other, period))
+
+                own = [stance for stance in entry.stances if stance.foot == foot]
+                nearest = min(own, key=lambda stance: away(stance.strike, begin))
+                errors["strike"].append(away(nearest.strike, begin))
+                errors["leaves"].append(away(nearest.leaves, end))
+    for found in errors.values():
+        assert len(found) > 120
+        assert max(found) < 0.05
+
+
+def published_contacts():
+    """Prefix, clip, duration and stances of the right and the left foot in the published tables."""
+    prefix = ""
+    for line in TABLES.read_text("utf-8").splitlines():
+        heading = re.match(r"### 3\.\d (Chr\w+)", line)
+        if heading:
+            prefix = heading[1] + ("_" if heading[1] == "ChrUtah" else "@")
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("## 4"):
+            return
+        if prefix and len(cells) == 7 and cells[0].isdigit() and "always" not in cells[4]:
+            left, right = (
+                [tuple(map(float, part.split("-"))) for part in cell.split(", ")] for cell in cells[4:6]
+            )
+            yield prefix, cells[1].removesuffix("_smooth"), float(cells[3]), (right, left)
 
 
 @pytest.mark.parametrize(

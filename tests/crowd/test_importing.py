@@ -301,6 +301,35 @@ def test_labels_correct_what_was_found(tmp_path):
         import_clip(source, SKELETON, correction=Correction(reach=ReachCorrection(side="left")))
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "walk_slow",
+        "walk",
+        "walk_fast",
+        "jog",
+        "run",
+        "walk_back",
+        "sidestep_slow_left",
+        "sidestep_fast_right",
+    ],
+)
+def test_a_gait_captured_in_place_is_as_fast_as_its_feet_tell(name):
+    clip = LIBRARY.clip(name)
+    still = replace(clip, root_position=np.zeros_like(clip.root_position))
+    found = import_clip(as_source(still), SKELETON)
+    speed = math.hypot(clip.parameters[0], clip.parameters[2])
+    assert found.in_place == pytest.approx(speed, rel=0.035)
+    assert found.clip.kind is ClipKind.LOCOMOTION
+    assert found.clip.parameters == pytest.approx(clip.parameters, rel=0.035, abs=0.01)
+    assert import_clip(as_source(clip), SKELETON).in_place == 0.0
+
+
+@pytest.mark.parametrize("name", ["in_place", "turn_left", "idle", "wave"])
+def test_who_stands_or_turns_on_the_spot_is_not_taken_for_a_walker_in_place(name):
+    assert import_clip(as_source(LIBRARY.clip(name)), SKELETON).in_place == 0.0
+
+
 def test_told_jumps_and_reaches_are_measured_at_the_told_times():
     source = as_source(LIBRARY.clip("walk"))
     jump = JumpCorrection(take_off=0.3, apex=0.4, landing=0.6)

@@ -26,6 +26,7 @@ from crowd.motion.importing.cycles import (
     sample,
     sample_linear,
 )
+from crowd.motion.importing.in_place import carried_along, ground_velocity
 from crowd.motion.importing.joint_names import JointMap, read_mapping
 from crowd.motion.importing.joint_shape import recognise
 from crowd.motion.importing.labels import Correction, JumpCorrection, ReachCorrection
@@ -87,6 +88,8 @@ class Imported:
         Frames that were mended.
     captured : (float, float, float) or None
         Forward m/s, turn rad/s and side m/s in the size of the source; of gaits.
+    in_place : float
+        Speed at which the ground glides under somebody who was captured in place, m/s; 0 for others.
     stances : tuple of Stance
         In times of the source, after what was cut off at its start, s.
     """
@@ -98,6 +101,7 @@ class Imported:
     unused_joints: tuple[str, ...]
     popped: int
     captured: tuple[float, float, float] | None
+    in_place: float = 0.0
     stances: tuple[Stance, ...] = ()
 
 
@@ -132,6 +136,9 @@ def import_clip(
     )
     convention = find_convention(motion, joints, settings.units, settings.up)
     source = cut(resampled(convert(motion, convention)), told, motion)
+    ground = ground_velocity(source, joints)
+    if ground is not None:
+        source = carried_along(source, ground)
     contacts = find_contacts(source, joints, is_loop=False)
     moved, popped = without_pops(
         retarget(source, joints, skeleton, contacts.foot_is_flat, sole_heights(contacts), contacts.ground)
@@ -164,6 +171,7 @@ def import_clip(
         joints.unused,
         popped,
         captured,
+        0.0 if ground is None else float(np.linalg.norm(ground)),
         tuple(stances) if clip.foot_events else (),
     )
 
