@@ -44,7 +44,7 @@ def ground_velocity(source: PosedSource, joints: JointMap) -> FloatArray | None:
     agree = [np.linalg.norm(glide - common, axis=1) < AGREES * speed for glide in glides]
     if min(float(foot.mean()) for foot in agree) <= MOST:
         return None
-    return common + gliding_left(carried_along(source, common), joints)
+    return np.asarray(common + gliding_left(carried_along(source, common), joints))
 
 
 def gliding_left(source: PosedSource, joints: JointMap) -> FloatArray:
