@@ -36,6 +36,9 @@ with Window(simulation, size=(640, 360), quality=crowd_viewer.FINE, has_panels=F
     slot = int(identity[rows[middle], columns[middle]]) - 1
     window.pick(float(columns[middle]), float(rows[middle]))
     print("picked", window.picked == slot)
+    before = window.playback.time
+    window.key(",")
+    print("stays", window.playback.is_paused and window.playback.time == before)
     for key in ("f", "h", *"1234567890", "b", "t"):
         window.key(key)
         window.refresh()
@@ -66,6 +69,7 @@ def test_a_window_shows_picks_and_closes():
     assert done.stdout.splitlines() == [
         "like headless True",
         "picked True",
+        "stays True",
         "drawn over True",
         "resized True",
         "errors GL_NO_ERROR",
@@ -124,3 +128,13 @@ def test_time_stops_steps_and_stays_within_the_recording():
     playback.is_paused = False
     playback.advance(9.0)
     assert playback.time == 3.0
+
+
+def test_a_recording_that_has_ended_begins_again():
+    playback = Playback(first=1.0, last=3.0, time=3.0, is_paused=True)
+    assert playback.share == 1.0
+    playback.toggle()
+    assert (playback.time, playback.is_paused, playback.share) == (1.0, False, 0.0)
+    playback.advance(0.5)
+    playback.toggle()
+    assert (playback.time, playback.is_paused) == (1.5, True)

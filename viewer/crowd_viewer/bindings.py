@@ -32,7 +32,7 @@ def keys_of(window: Window) -> tuple[Key, ...]:
     return (
         Key("space", "pause", playback.toggle),
         Key(".", "next frame", lambda: playback.single_step(1)),
-        Key(",", "frame before", lambda: playback.single_step(-1)),
+        Key(",", "frame before", window.step_back),
         Key("[", "slower", lambda: playback.change_speed(-1)),
         Key("]", "faster", lambda: playback.change_speed(1)),
         Key("f", "follow", lambda: controls.toggle_follow(window.picked)),

@@ -243,6 +243,12 @@ class Window:
             self._glfw.make_context_current(self.handle)
             self.renderer.resize(self.size)
 
+    def step_back(self) -> None:
+        """Show the frame before; a simulation knows none and only pauses."""
+        self.playback.is_paused = True
+        if self.simulation is None:
+            self.playback.single_step(-1)
+
     def toggle_top(self) -> None:
         """Look straight down, and back."""
         low_x, high_x, low_z, high_z = self._source.scene.bounds
