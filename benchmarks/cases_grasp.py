@@ -11,8 +11,10 @@ from crowd.motion.hand import hand_table
 from crowd.world.mesh import Mesh
 from crowd.world.objects import Objects, ShapeKind
 from crowd.world.shape_table import shape_table
+from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.grasp import close_hands, measure_gaps
 from crowd_kernels.hand_placement import place_hands
+from crowd_kernels.hand_pose import compose_frames, hands_in_world, pose_hands
 
 DEEPEST = 1e-4
 """m."""
@@ -123,6 +125,68 @@ def placed(grasps: Grasps) -> str | None:
     return grasps.problem()
 
 
+@dataclass
+class Holding:
+    """Both hands of many people who hold something."""
+
+    hand: Any
+    character: Any
+    side: Any
+    style: Any
+    weight: Any
+    closure: Any
+    pose: Any
+    place: Any
+    turn: Any
+    root: Any
+    yaw: Any
+    grip: Any
+    hands: Any
+    items: Any
+
+    def pose_fingers(self) -> None:
+        """Write all fingers."""
+        pose_hands(self.hand, self.character, self.side, self.style, self.weight, self.closure, self.pose)
+
+    def follow(self) -> None:
+        """Let all objects follow."""
+        joint = np.array([0, 1], np.int32)
+        frames = self.place, self.turn, self.root, self.yaw
+        hands_in_world(joint, self.character, self.side, *frames, *self.hands)
+        (place, turn), (inner, inner_turn) = self.hands, self.grip
+        compose_frames(place, turn, inner, inner_turn, False, *self.items)
+
+    def pose_problem(self) -> str | None:
+        """Check that fingers are unit rotations."""
+        joints = self.pose.reshape(len(self.pose), 4, -1)[:, :, self.hand.joint.ravel()]
+        length = np.sqrt((joints**2).sum(axis=1))
+        return None if np.abs(length - 1).max() < 1e-5 else "a finger is no rotation"
+
+    def follow_problem(self) -> str | None:
+        """Check that objects are as far from hands as their grips."""
+        away = np.linalg.norm(self.items[0] - self.hands[0], axis=1)
+        wrong = np.abs(away - np.linalg.norm(self.grip[0], axis=1)).max()
+        return None if wrong < 1e-6 else f"an object is {wrong:g} m off"
+
+
+def holding(size: int, rng: np.random.Generator) -> Holding:
+    """Make people whose hands hold something."""
+    count = 2 * size
+    turn = rng.normal(size=(count, 4))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    pose = np.zeros((size, 4, PADDED_JOINTS), np.float32)
+    pose[:, 0] = 1
+    return Holding(
+        hand_table(build_skeleton()), np.repeat(np.arange(size, dtype=np.int32), 2),
+        np.tile(np.array([0, 1], np.int32), size), np.zeros(count, np.int32), np.ones(count),
+        rng.uniform(0, 1, (size, 2, 15)).astype(np.float32), pose.reshape(size, -1),
+        rng.normal(size=(size, 2, 3)).astype(np.float32), turn.reshape(size, 2, 4).astype(np.float32),
+        rng.normal(size=(size, 3)), rng.uniform(-3, 3, size),
+        (rng.normal(size=(count, 3)), turn[::-1].copy()), (np.zeros((count, 3)), np.zeros((count, 4))),
+        (np.zeros((count, 3)), np.zeros((count, 4))),
+    )  # fmt: skip
+
+
 CASES = [
     *[
         Case(
@@ -136,5 +200,7 @@ CASES = [
     ],
     Case("place a hand, box", (1000,), grasps_of(ShapeKind.BOX), Grasps.place, placed),
     Case("place a hand, mesh", (300,), grasps_of(ShapeKind.MESH), Grasps.place, placed),
+    Case("pose both hands", (1000,), holding, Holding.pose_fingers, Holding.pose_problem),
+    Case("objects follow both hands", (1000,), holding, Holding.follow, Holding.follow_problem),
     Case("gaps of a hand, capsule", (300,), grasps_of(ShapeKind.CAPSULE), Grasps.measure, Grasps.problem),
 ]

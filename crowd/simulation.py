@@ -18,6 +18,7 @@ from crowd.controllers.animation import Animation
 from crowd.controllers.controller import Controller, Step
 from crowd.controllers.foot_lock import FootLock
 from crowd.controllers.gaze import Gaze
+from crowd.controllers.grab import Grab
 from crowd.controllers.idle import Idle
 from crowd.controllers.locomotion import Locomotion
 from crowd.controllers.world_offset import WorldOffset
@@ -111,6 +112,8 @@ class Simulation:
         self.idle = Idle(capacity)
         self.locomotion = Locomotion(capacity)
         self.animation = Animation(capacity)
+        self.joints = Joints(self.model.skeleton, capacity)
+        self.grab = Grab(self.model, self.objects, self.joints)
         self.gaze = Gaze(
             self.model.skeleton, capacity, self.navigator.avoidance, self.objects, self.model.placed
         )
@@ -119,10 +122,10 @@ class Simulation:
             self.idle,
             self.locomotion,
             self.animation,
+            self.grab,
             self.gaze,
         )
         self.foot_lock = FootLock(self.model.skeleton, capacity=capacity, dt=self.dt)
-        self.joints = Joints(self.model.skeleton, capacity)
         self.commands = Commands(self)
         self.metrics = Metrics()
         self.stage_seconds = dict.fromkeys(STAGES, 0.0)
@@ -225,6 +228,7 @@ class Simulation:
             state.foot_contact,
         )
         self.joints.compute(state, model.people, step.active)
+        self.grab.settle(step)
 
     def _record(self, step: Step, frame: Frame) -> None:
         """Hand the frame to metrics."""

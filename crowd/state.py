@@ -164,6 +164,46 @@ class State:
     pose_pelvis: Float32Array = _array(3, dtype=np.float32)
     """Pelvis in the root frame at leg scale 1, m. (character, 3)"""
 
+    reach_stage: ByteArray = _array(2, dtype=np.uint8)
+    """Stage of each hand's reach, right and left: 0 none, 1 move, 2 hold, 3 return. (character, 2)"""
+    reach_status: ByteArray = _array(2, dtype=np.uint8)
+    """0 none, 1 moving, 2 reached, 3 out of reach (as near as can be), 4 refused target. (character, 2)"""
+    reach_target_world: FloatArray = _array(2, 3)
+    """Where a point of the hand shall come, m; may change in every step. (character, 2, 3)"""
+    reach_target_rotation_world: FloatArray = _array(2, 4)
+    """Rotation that the hand joint shall have where `reach_has_rotation`. (character, 2, 4)"""
+    reach_has_rotation: BoolArray = _array(2, dtype=np.bool_)
+    """A rotation is asked for. (character, 2)"""
+    reach_point_hand: FloatArray = _array(2, 3)
+    """Point in the hand joint's frame that comes to the target, 0 for the wrist, m. (character, 2, 3)"""
+
+    grab_stage: ByteArray = _array(2, dtype=np.uint8)
+    """Stage of each hand, right and left: 0 open, 1 closing, 2 holding, 3 opening. (character, 2)"""
+    grab_status: ByteArray = _array(2, dtype=np.uint8)
+    """How the grasp stands, see `crowd.controllers.grab.GrabStatus`. (character, 2)"""
+    grab_purpose: ByteArray = _array(2, dtype=np.uint8)
+    """What the hand is for: 0 nothing, 1 grasp, 2 touch, 3 grasp with both hands. (character, 2)"""
+    grab_object: IntArray = _array(2, dtype=np.int32, fill=-1)
+    """Object that the hand goes to or holds, -1 for none. (character, 2)"""
+    grab_giver: IntArray = _array(2, dtype=np.int32, fill=-1)
+    """Character from whom the hand takes the object, -1 for none. (character, 2)"""
+    grab_style: IntArray = _array(2, dtype=np.int32)
+    """Style of the grip: 0 palm and fingers, 1 finger tips. (character, 2)"""
+    grab_position: FloatArray = _array(2, 3)
+    """Where the hand joint goes, in the object's frame, m. (character, 2, 3)"""
+    grab_rotation: FloatArray = _array(2, 4)
+    """Rotation that it gets, in the object's frame. (character, 2, 4)"""
+    grab_time: FloatArray = _array(2)
+    """Time since the fingers began to close or to open, s. (character, 2)"""
+    grab_weight: FloatArray = _array(2)
+    """Progress from the fingers of the layers below to those of the grip, 0 to 1. (character, 2)"""
+    finger_closure: Float32Array = _array(2, 15, dtype=np.float32)
+    """Closure of each finger joint, thumb to little finger: 0 open, 1 closed. (character, 2, 15)"""
+    finger_limit: Float32Array = _array(2, 15, dtype=np.float32)
+    """Closure at which each joint stops on the object. (character, 2, 15)"""
+    finger_contact: ByteArray = _array(2, 15, dtype=np.uint8)
+    """1 where the segment touches the object. (character, 2, 15)"""
+
     foot_contact: ByteArray = _array(2, dtype=np.uint8)
     """Contact of each foot: 0 swing, 1 heel, 2 ball. (character, 2)"""
     foot_point_world: FloatArray = _array(2, 2, 3)

@@ -170,3 +170,9 @@ def test_nlerp_stays_on_the_way_of_slerp(a, b, share):
 def test_mixing_starts_at_one_and_ends_at_the_other(mix, a, b):
     assert close(mix(a, b, 0.0), a, 1e-7)
     assert close(mix(a, b, 1.0), b, 1e-7)
+
+
+@given(quaternions)
+def test_axes_are_turned_back_into_their_rotation(q):
+    axes = [tuple(column) for column in oracle.matrix(q).T]
+    assert abs(np.dot(kernels.from_axes(*axes), q)) == pytest.approx(1, abs=1e-12)

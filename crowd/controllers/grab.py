@@ -1,0 +1,602 @@
+"""Layer 6, grab: fingers close on objects, hold them and let them go."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.controllers.controller import Step
+from crowd.controllers.grip_placement import GripPlacement
+from crowd.joints import Joints
+from crowd.model import Model
+from crowd.motion.hand import SIDES, hand_table
+from crowd.state import BoolArray, FloatArray, IntArray, State
+from crowd.world.objects import ObjectState
+from crowd.world.shape_table import shape_table
+from crowd_kernels.grasp import close_hands
+from crowd_kernels.hand_placement import TOO_BIG
+from crowd_kernels.hand_pose import compose_frames, hands_in_world, pose_hands
+
+OPEN, CLOSING, HOLDING, OPENING = range(4)
+NOTHING, GRASP, TOUCH, GRASP_BOTH = range(4)
+REACH_NONE, REACH_MOVE, REACH_HOLD = range(3)
+REACH_OUT_OF_REACH, REACH_REFUSED = 3, 4
+
+Hands = tuple[IntArray, IntArray]
+"""Characters and their hands, 0 right, 1 left; (A,) each."""
+
+
+class GrabStatus(IntEnum):
+    """How a grasp stands."""
+
+    NONE = 0
+    APPROACHING = 1
+    HOLDING = 2
+    TOUCHING = 3
+    REFUSED = 4
+    """No such object, an object that is nowhere, or a hand that holds something else."""
+    TAKEN = 5
+    """Somebody else holds the object and does not offer it."""
+    TOO_BIG = 6
+    """One hand cannot hold it; both may."""
+    MISSED = 7
+    """The fingers met nothing."""
+    OUT_OF_REACH = 8
+    """The hand is as near as it gets."""
+
+
+@dataclass(frozen=True)
+class GrabSettings:
+    """How hands grasp."""
+
+    close_time: float = 0.32
+    """s, > 0. From the open to the closed hand."""
+    open_time: float = 0.28
+    """s, > 0. From a grip to the open hand."""
+    shape_time: float = 0.4
+    """s, > 0. From the fingers of other layers to the open hand, and back."""
+    near: float = 0.002
+    """m. A hand this near to its place on the object closes."""
+    near_angle: float = 0.045
+    """rad. Likewise for its rotation."""
+    settle_distance: float = 0.01
+    """m. An object let go this near to where it was to be put is put exactly there."""
+
+
+class Reaches(Protocol):
+    """Whoever moves hands."""
+
+    def start(
+        self,
+        state: State,
+        characters: IntArray,
+        hand: npt.ArrayLike,
+        position_world: npt.ArrayLike,
+        rotation_world: npt.ArrayLike | None = None,
+    ) -> None:
+        """Let hand joints go to targets."""
+
+    def end(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> None:
+        """Let hands return."""
+
+
+class Grab:
+    """Brings hands to objects, closes them, lets held objects follow, and opens them."""
+
+    state_fields: ClassVar[tuple[str, ...]] = (
+        "grab_stage",
+        "grab_status",
+        "grab_purpose",
+        "grab_object",
+        "grab_giver",
+        "grab_style",
+        "grab_position",
+        "grab_rotation",
+        "grab_time",
+        "grab_weight",
+        "finger_closure",
+        "finger_limit",
+        "finger_contact",
+    )
+
+    def __init__(
+        self,
+        model: Model,
+        objects: ObjectState,
+        joints: Joints,
+        reach: Reaches | None = None,
+        settings: GrabSettings | None = None,
+    ) -> None:
+        self.settings = settings or GrabSettings()
+        skeleton = model.skeleton
+        self.objects = objects
+        self.reach = reach
+        self.hand = hand_table(skeleton)
+        self.shapes = shape_table(model.objects)
+        self.placement = GripPlacement(model, self.hand, self.shapes, objects, joints)
+        self._joints = joints
+        self._scale = self.placement.scale
+        self._hand_joint = np.array([skeleton.joint(f"{side}_hand") for side in SIDES], np.int32)
+
+    def activate(self, state: State, characters: IntArray) -> None:
+        """Start people with empty hands."""
+        state.grab_stage[characters] = OPEN
+        state.grab_object[characters] = -1
+
+    # ---- what is asked
+
+    def grasp(self, state: State, characters: IntArray, hand: npt.ArrayLike, item: npt.ArrayLike) -> None:
+        """Let hands go to objects, close around them and hold them.
+
+        A second hand of the same character that is sent to an object makes it a grasp with both hands, palms
+        on opposite sides. What another character holds out is taken over; so is what the other hand holds.
+
+        Parameters
+        ----------
+        state : State
+        characters : (M,) int32
+            Each once.
+        hand : int or (M,) int
+            0 right, 1 left.
+        item : int or (M,) int
+            Rows of the objects. How it goes shows in ``state.grab_status``.
+        """
+        rows, hands, items = _listed(characters, hand, item)
+        may = self._accept(state, (rows, hands), items)
+        rows, hands, items = rows[may], hands[may], items[may]
+        other = 1 - hands
+        together = (state.grab_object[rows, other] == items) & (state.grab_stage[rows, other] == OPEN)
+        alone = ~together
+        status = self._place(state, (rows[alone], hands[alone]), items[alone], GRASP)
+        small = status != TOO_BIG
+        self._send(state, (rows[alone][small], hands[alone][small]))
+        too_big = rows[alone][~small], hands[alone][~small]
+        state.grab_status[too_big] = GrabStatus.TOO_BIG
+        self._grasp_together(state, rows[together], items[together])
+
+    def grasp_both(self, state: State, characters: IntArray, item: npt.ArrayLike) -> None:
+        """Let both hands go to opposite sides of objects and hold them together; see `grasp`."""
+        for hand in (0, 1):
+            self.grasp(state, characters, hand, item)
+
+    def touch(self, state: State, characters: IntArray, hand: npt.ArrayLike, item: npt.ArrayLike) -> None:
+        """Let hands go to objects and lie on them without closing; arguments as in `grasp`."""
+        rows, hands, items = _listed(characters, hand, item)
+        may = self._accept(state, (rows, hands), items, holds=False)
+        self._place(state, (rows[may], hands[may]), items[may], TOUCH)
+        self._send(state, (rows[may], hands[may]))
+
+    def release(
+        self,
+        state: State,
+        characters: IntArray,
+        hand: npt.ArrayLike,
+        position_world: npt.ArrayLike | None = None,
+        rotation_world: npt.ArrayLike | None = None,
+    ) -> None:
+        """Open hands; objects that no hand holds any more stay where they are.
+
+        Parameters
+        ----------
+        state : State
+        characters : (M,) int32
+            Each once.
+        hand : int or (M,) int
+            0 right, 1 left. A hand that is on its way gives up.
+        position_world : (3,) or (M, 3) array, optional
+            Where the objects are to be, m; taken over where they are within `settle_distance` of it.
+        rotation_world : (4,) or (M, 4) array, optional
+            Likewise, unit quaternions.
+        """
+        rows, hands, _ = _listed(characters, hand, 0)
+        items = state.grab_object[rows, hands]
+        has = (items >= 0) & (self.objects.holder[np.maximum(items, 0)] == rows)
+        has &= self.objects.holder_hand[np.maximum(items, 0), hands]
+        self.objects.holder_hand[items[has], hands[has]] = False
+        free = has & ~self.objects.holder_hand[np.maximum(items, 0)].any(axis=1)
+        self.objects.holder[items[free]] = -1
+        if position_world is not None:
+            places = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))
+            turns = (
+                self.objects.rotation_world[np.maximum(items, 0)]
+                if rotation_world is None
+                else np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))
+            )
+            away = np.linalg.norm(places - self.objects.position_world[np.maximum(items, 0)], axis=1)
+            put = free & (away <= self.settings.settle_distance)
+            self.objects.position_world[items[put]] = places[put]
+            self.objects.rotation_world[items[put]] = turns[put]
+        self._open(state, (rows, hands))
+
+    def put(
+        self,
+        state: State,
+        characters: IntArray,
+        hand: npt.ArrayLike,
+        position_world: npt.ArrayLike,
+        rotation_world: npt.ArrayLike,
+    ) -> None:
+        """Let hands bring what they hold to poses in the world; `release` then lets go.
+
+        Parameters
+        ----------
+        state : State
+        characters : (M,) int32
+            Each once; those whose hand holds nothing are left out.
+        hand : int or (M,) int
+        position_world : (3,) or (M, 3) array
+            Centre of the object, m.
+        rotation_world : (4,) or (M, 4) array
+        """
+        rows, hands, _ = _listed(characters, hand, 0)
+        place, turn = self.hand_targets(state, rows, hands, position_world, rotation_world)
+        holds = state.grab_stage[rows, hands] == HOLDING
+        if self.reach is not None:
+            self.reach.start(state, rows[holds], hands[holds], place[holds], turn[holds])
+
+    def hand_targets(
+        self,
+        state: State,
+        characters: IntArray,
+        hand: npt.ArrayLike,
+        position_world: npt.ArrayLike,
+        rotation_world: npt.ArrayLike,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Find where hand joints must be for what they hold to come to poses: (M, 3) m and (M, 4)."""
+        rows, hands, _ = _listed(characters, hand, 0)
+        items = np.maximum(state.grab_object[rows, hands], 0)
+        none = np.zeros((rows.size, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (rows.size, 1))
+        grip = self.objects.grip_position[items, hands], self.objects.grip_rotation[items, hands]
+        back = _composed(*grip, *none, is_inverse=True)
+        outer = (
+            np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3)).copy(),
+            np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4)).copy(),
+        )
+        return _composed(*outer, *back)
+
+    # ---- in every step
+
+    def evaluate(self, step: Step) -> None:
+        """Advance the fingers of hands that are at work and write them into the poses."""
+        state, settings = step.state, self.settings
+        busy = (state.grab_object[step.active] >= 0) | (state.grab_weight[step.active] > 0.0)
+        place, hands = np.nonzero(busy)
+        if place.size == 0:
+            return
+        rows, hands = step.active[place], hands.astype(np.int32)
+        is_wanted = state.grab_object[rows, hands] >= 0
+        change = np.where(is_wanted, 1.0, -1.0) * step.dt / settings.shape_time
+        weight = np.clip(state.grab_weight[rows, hands] + change, 0.0, 1.0)
+        state.grab_weight[rows, hands] = weight
+        stage = state.grab_stage[rows, hands]
+        opened = rows[stage == OPEN], hands[stage == OPEN]
+        still_closed = state.finger_closure[opened] - np.float32(step.dt / settings.open_time)
+        state.finger_closure[opened] = np.maximum(still_closed, 0.0)
+        self._close(state, (rows[stage == CLOSING], hands[stage == CLOSING]), step.dt)
+        self._go_on_opening(state, (rows[stage == OPENING], hands[stage == OPENING]), step.dt)
+        pose_hands(
+            self.hand,
+            rows,
+            hands,
+            np.ascontiguousarray(state.grab_style[rows, hands]),
+            _smooth(weight),
+            state.finger_closure,
+            state.pose_rotation,
+        )
+
+    def settle(self, step: Step) -> None:
+        """After the joints are known: hands that have arrived begin to close, held objects follow."""
+        state = step.state
+        self._drop_of_the_gone(state)
+        place, hands = np.nonzero(state.grab_object[step.active] >= 0)
+        rows, hands = step.active[place], hands.astype(np.int32)
+        waits = (state.grab_stage[rows, hands] == OPEN) & np.isin(
+            state.grab_status[rows, hands], (GrabStatus.APPROACHING, GrabStatus.OUT_OF_REACH)
+        )
+        if waits.any():
+            self._arrive(state, (rows[waits], hands[waits]))
+        self._carry(state)
+        if waits.any():
+            self._follow(state, (rows[waits], hands[waits]))
+
+    # ---- parts of these
+
+    def _accept(self, state: State, hands: Hands, items: IntArray, holds: bool = True) -> BoolArray:
+        """Sort out hands that cannot go to their objects, and say why."""
+        rows, side = hands
+        objects = self.objects
+        exists = (items >= 0) & (items < objects.count)
+        known = np.where(exists, items, 0)
+        if objects.count:
+            exists &= np.isfinite(objects.position_world[known]).all(axis=1)
+        is_free = np.isin(state.grab_stage[rows, side], (OPEN, OPENING))
+        may = exists & is_free
+        state.grab_status[rows[is_free], side[is_free]] = GrabStatus.REFUSED
+        state.grab_status[rows[may], side[may]] = GrabStatus.APPROACHING
+        if not holds or not may.any():
+            return np.asarray(may)
+        giver = objects.holder[known]
+        is_others = may & (giver >= 0) & (giver != rows)
+        offers = ((state.reach_stage[giver] != REACH_NONE) & objects.holder_hand[known]).any(axis=1)
+        taken = is_others & ~offers
+        state.grab_status[rows[taken], side[taken]] = GrabStatus.TAKEN
+        state.grab_giver[rows, side] = np.where(may, giver, -1)
+        return np.asarray(may & ~taken)
+
+    def _place(self, state: State, hands: Hands, items: IntArray, purpose: int) -> IntArray:
+        """Choose grips for single hands; tells who is `TOO_BIG`."""
+        rows, side = hands
+        position, rotation, style, status = self.placement.of_one_hand(state, rows, side, items)
+        state.grab_object[rows, side] = items
+        state.grab_purpose[rows, side] = purpose
+        state.grab_style[rows, side] = style
+        state.grab_position[rows, side] = position
+        state.grab_rotation[rows, side] = rotation
+        state.finger_contact[rows, side] = 0
+        state.grab_stage[rows, side] = OPEN
+        return status
+
+    def _grasp_together(self, state: State, rows: IntArray, items: IntArray) -> None:
+        """Choose grips on opposite sides, and send both hands."""
+        if rows.size == 0:
+            return
+        position, rotation, fits = self.placement.of_both_hands(state, rows, items)
+        for side in (0, 1):
+            hands = np.full(rows.size, side, np.int32)
+            state.grab_object[rows, side] = items
+            state.grab_purpose[rows, side] = GRASP_BOTH
+            state.grab_style[rows, side] = 0
+            state.grab_position[rows, side] = position[:, side]
+            state.grab_rotation[rows, side] = rotation[:, side]
+            state.finger_contact[rows, side] = 0
+            state.grab_stage[rows, side] = OPEN
+            state.grab_giver[rows, side] = self.objects.holder[items]
+            state.grab_status[rows, side] = np.where(fits, GrabStatus.APPROACHING, GrabStatus.TOO_BIG)
+            self._send(state, (rows[fits], hands[fits]))
+
+    def _send(self, state: State, hands: Hands) -> None:
+        """Let the reach layer bring hands to their grips."""
+        if self.reach is not None and hands[0].size:
+            self.reach.start(state, *hands, *self._wanted(state, hands))
+
+    def _wanted(self, state: State, hands: Hands) -> tuple[FloatArray, FloatArray]:
+        """Where hand joints shall be for their grips, in the world."""
+        items = state.grab_object[hands]
+        return _composed(
+            self.objects.position_world[items],
+            self.objects.rotation_world[items],
+            state.grab_position[hands],
+            state.grab_rotation[hands],
+        )
+
+    def _hands(self, state: State, hands: Hands) -> tuple[FloatArray, FloatArray]:
+        """Where hand joints are, in the world."""
+        position, rotation = np.zeros((hands[0].size, 3)), np.zeros((hands[0].size, 4))
+        hands_in_world(
+            self._hand_joint,
+            *hands,
+            self._joints.position_model,
+            self._joints.rotation_model,
+            state.position_world,
+            state.yaw,
+            position,
+            rotation,
+        )
+        return position, rotation
+
+    def _arrive(self, state: State, hands: Hands) -> None:
+        """Let hands that are at their grips touch or begin to close; give up what others have taken."""
+        rows, side = hands
+        items = state.grab_object[hands]
+        holder = self.objects.holder[items]
+        lost = (holder >= 0) & (holder != rows) & (holder != state.grab_giver[hands])
+        lost &= state.grab_purpose[hands] != TOUCH
+        self._give_up(state, (rows[lost], side[lost]), GrabStatus.TAKEN)
+        refused = ~lost & (state.reach_status[hands] == REACH_REFUSED)
+        self._give_up(state, (rows[refused], side[refused]), GrabStatus.REFUSED)
+        stays = ~lost & ~refused
+        far = stays & (state.reach_status[hands] == REACH_OUT_OF_REACH)
+        state.grab_status[rows[stays], side[stays]] = np.where(
+            far[stays], GrabStatus.OUT_OF_REACH, GrabStatus.APPROACHING
+        )
+        is_near = stays & self._is_near(state, hands)
+        touching = is_near & (state.grab_purpose[hands] == TOUCH)
+        state.grab_status[rows[touching], side[touching]] = GrabStatus.TOUCHING
+        closing = is_near & (state.grab_purpose[hands] == GRASP)
+        # Of several hands that arrive at once the first one gets the object.
+        first = np.zeros(rows.size, np.bool_)
+        first[np.flatnonzero(closing)[np.unique(items[closing], return_index=True)[1]]] = True
+        self._begin(state, (rows[first], side[first]))
+        both = is_near & (state.grab_purpose[hands] == GRASP_BOTH)
+        count = np.bincount(rows[both], minlength=state.capacity)
+        pair = both & (count[rows] == 2)
+        if pair.any():
+            owner = np.unique(items[pair], return_index=True)[1]
+            chosen = np.isin(rows, rows[pair][owner]) & pair
+            self._begin(state, (rows[chosen], side[chosen]))
+
+    def _is_near(self, state: State, hands: Hands) -> BoolArray:
+        """Who is at the grip, within `near` and `near_angle`."""
+        place, turn = self._hands(state, hands)
+        wanted_place, wanted_turn = self._wanted(state, hands)
+        away = np.linalg.norm(place - wanted_place, axis=1)
+        cosine = np.minimum(np.abs((turn * wanted_turn).sum(axis=1)), 1.0)
+        return np.asarray(
+            (away <= self.settings.near) & (2.0 * np.arccos(cosine) <= self.settings.near_angle)
+        )
+
+    def _begin(self, state: State, hands: Hands) -> None:
+        """Find where fingers will end, fix objects to hands, and begin to close."""
+        rows, side = hands
+        if rows.size == 0:
+            return
+        items = state.grab_object[hands]
+        place, turn = self._hands(state, hands)
+        objects = self.objects
+        limit, contact = state.finger_limit, state.finger_contact
+        limit[hands] = 0.0
+        contact[hands] = 0
+        close_hands(
+            self.hand,
+            self.shapes,
+            rows,
+            side,
+            np.ascontiguousarray(state.grab_style[hands]),
+            np.ascontiguousarray(items),
+            self._scale[rows],
+            place,
+            turn,
+            objects.position_world,
+            objects.rotation_world,
+            limit,
+            contact,
+        )
+        met = contact[hands].any(axis=1) | (state.grab_purpose[hands] == GRASP_BOTH)
+        self._give_up(state, (rows[~met], side[~met]), GrabStatus.MISSED)
+        rows, side, items = rows[met], side[met], items[met]
+        there = objects.position_world[items], objects.rotation_world[items]
+        grip = _composed(place[met], turn[met], *there, is_inverse=True)
+        self._take_from_others(state, rows, side, items)
+        objects.holder[items] = rows
+        objects.holder_hand[items, side] = True
+        objects.grip_position[items, side], objects.grip_rotation[items, side] = grip
+        state.grab_stage[rows, side] = CLOSING
+        state.grab_time[rows, side] = 0.0
+
+    def _take_from_others(self, state: State, rows: IntArray, side: IntArray, items: IntArray) -> None:
+        """Open the hands that held these objects until now."""
+        objects = self.objects
+        for hand in (0, 1):
+            holder = objects.holder[items]
+            held = (holder >= 0) & objects.holder_hand[items, hand]
+            # Both hands that begin together are no others.
+            held &= ~((holder == rows) & (state.grab_purpose[rows, side] == GRASP_BOTH))
+            givers = holder[held]
+            objects.holder_hand[items[held], hand] = False
+            self._open(state, (givers, np.full(givers.size, hand, np.int32)))
+
+    def _close(self, state: State, hands: Hands, dt: float) -> None:
+        """Go on closing."""
+        if hands[0].size == 0:
+            return
+        time = state.grab_time[hands] + dt
+        state.grab_time[hands] = time
+        share = _smooth(np.minimum(time / self.settings.close_time, 1.0))
+        limit = state.finger_limit[hands]
+        state.finger_closure[hands] = np.minimum(limit, share[:, None]).astype(np.float32)
+        done = (share[:, None] >= limit).all(axis=1)
+        ready = hands[0][done], hands[1][done]
+        state.grab_stage[ready] = HOLDING
+        state.grab_status[ready] = GrabStatus.HOLDING
+
+    def _go_on_opening(self, state: State, hands: Hands, dt: float) -> None:
+        """Go on opening; a hand that is open is free."""
+        if hands[0].size == 0:
+            return
+        before = state.grab_time[hands]
+        state.grab_time[hands] = before + dt
+        length = self.settings.open_time
+        left = 1.0 - _smooth(np.minimum((before + dt) / length, 1.0))
+        had = 1.0 - _smooth(np.minimum(before / length, 1.0))
+        share = left / np.maximum(had, 1e-9)
+        state.finger_closure[hands] *= share[:, None].astype(np.float32)
+        done = left <= 0.0
+        ready = hands[0][done], hands[1][done]
+        state.finger_closure[ready] = 0.0
+        self._forget(state, ready, GrabStatus.NONE)
+
+    def _open(self, state: State, hands: Hands) -> None:
+        """Begin to open hands; those that have not closed yet are free at once."""
+        rows, side = hands
+        closed = np.isin(state.grab_stage[hands], (CLOSING, HOLDING))
+        state.grab_time[rows[closed], side[closed]] = 0.0
+        state.grab_stage[rows[closed], side[closed]] = OPENING
+        state.grab_status[rows[closed], side[closed]] = GrabStatus.NONE
+        idle = state.grab_stage[hands] == OPEN
+        self._forget(state, (rows[idle], side[idle]), GrabStatus.NONE)
+
+    def _give_up(self, state: State, hands: Hands, status: GrabStatus) -> None:
+        """Free hands that are on their way, and let them return."""
+        if hands[0].size == 0:
+            return
+        self._forget(state, hands, status)
+        if self.reach is not None:
+            self.reach.end(state, *hands)
+
+    def _forget(self, state: State, hands: Hands, status: GrabStatus) -> None:
+        state.grab_object[hands] = -1
+        state.grab_giver[hands] = -1
+        state.grab_purpose[hands] = NOTHING
+        state.grab_stage[hands] = OPEN
+        state.grab_status[hands] = status
+        state.finger_contact[hands] = 0
+
+    def _drop_of_the_gone(self, state: State) -> None:
+        """Leave objects where they are whose holder has left the scene."""
+        objects = self.objects
+        gone = (objects.holder >= 0) & ~state.is_active[np.maximum(objects.holder, 0)]
+        objects.holder[gone] = -1
+        objects.holder_hand[gone] = False
+
+    def _carry(self, state: State) -> None:
+        """Let held objects follow; between two hands they take the middle of what both ask for."""
+        objects = self.objects
+        items, side = np.nonzero(objects.holder_hand)
+        if items.size == 0:
+            return
+        hands = objects.holder[items], side.astype(np.int32)
+        place, turn = _composed(
+            *self._hands(state, hands), objects.grip_position[items, side], objects.grip_rotation[items, side]
+        )
+        second = np.zeros(items.size, np.bool_)
+        second[1:] = items[1:] == items[:-1]
+        first = ~second
+        objects.position_world[items[first]] = place[first]
+        objects.rotation_world[items[first]] = turn[first]
+        both = np.flatnonzero(second)
+        if both.size:
+            sign = np.sign((turn[both] * turn[both - 1]).sum(axis=1, keepdims=True))
+            middle = turn[both] + sign * turn[both - 1]
+            objects.position_world[items[both]] = 0.5 * (place[both] + place[both - 1])
+            objects.rotation_world[items[both]] = middle / np.linalg.norm(middle, axis=1, keepdims=True)
+
+    def _follow(self, state: State, hands: Hands) -> None:
+        """Give hands that are on their way the places of objects that have moved."""
+        still = state.grab_object[hands] >= 0
+        still &= state.grab_stage[hands] == OPEN
+        rows, side = hands[0][still], hands[1][still]
+        if self.reach is None or rows.size == 0:
+            return
+        state.reach_target_world[rows, side], state.reach_target_rotation_world[rows, side] = self._wanted(
+            state, (rows, side)
+        )
+
+
+def _listed(
+    characters: IntArray, hand: npt.ArrayLike, item: npt.ArrayLike
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Characters, hands and objects as arrays of one length."""
+    rows = np.atleast_1d(np.asarray(characters, np.int32))
+    hands = np.broadcast_to(np.asarray(hand, np.int32), rows.shape)
+    items = np.broadcast_to(np.asarray(item, np.int32), rows.shape)
+    return rows, np.ascontiguousarray(hands), np.ascontiguousarray(items)
+
+
+def _smooth(progress: FloatArray) -> FloatArray:
+    """Rise from 0 to 1 with continuous second derivative (Perlin 2002)."""
+    return np.asarray(progress**3 * (progress * (6.0 * progress - 15.0) + 10.0))
+
+
+def _composed(
+    position: FloatArray,
+    rotation: FloatArray,
+    inner_position: FloatArray,
+    inner_rotation: FloatArray,
+    is_inverse: bool = False,
+) -> tuple[FloatArray, FloatArray]:
+    """Chain frames, or with `is_inverse` express the second ones in the first ones."""
+    place, turn = np.zeros((len(position), 3)), np.zeros((len(position), 4))
+    compose_frames(position, rotation, inner_position, inner_rotation, is_inverse, place, turn)
+    return place, turn
