@@ -171,6 +171,20 @@ def test_pedpy_analyses_an_exported_corridor(corridor, tmp_path):
     assert both.density.max() > 0.05
     walking = both[both.density > 0].speed_mean
     assert 0.5 < walking.mean() < 2.0
+    # The fundamental diagram: speed, and flow through a metre, against density by Voronoi cells.
+    cells = pedpy.compute_individual_voronoi_polygons(
+        traj_data=trajectory,
+        walkable_area=area,
+        cut_off=pedpy.Cutoff(radius=1.0, quad_segments=3),
+        use_blind_points=False,
+    )
+    cells = cells.merge(speed, on=["id", "frame"]).dropna()
+    assert len(cells) > 500
+    flow = cells.density * cells.speed
+    assert 0.1 < cells.density.median() < 6.0
+    assert flow.max() < 8.0
+    crowded = cells.density > cells.density.median()
+    assert cells.speed[crowded].mean() <= cells.speed[~crowded].mean() + 0.1
 
 
 def test_jupedsim_files_keep_left_and_right(plaza, tmp_path):
