@@ -416,6 +416,7 @@ def test_missing_sides_are_mirrored_and_gaps_are_filled_and_named():
     assert origin["walking backward"] == "built-in library"
     assert origin["turning left on the spot"] == "built-in library"
     assert origin["standing idle"] == origin["gestures"] == "built-in library"
+    assert origin["reaching with the left hand"] == "built-in library"
     assert {need.name for need in (*NEEDS, *OTHER_NEEDS)} == set(origin)
     assert all(origin[need.name] != "missing" for need in NEEDS)
     bare = assemble(clips, "test", "us", "MIT", fills=False)

@@ -96,10 +96,13 @@ class OtherNeed:
         In words.
     holds : callable
         Whether a clip serves it.
+    is_built_in : bool
+        The engine has motion of its own for it, whatever a library holds.
     """
 
     name: str
     holds: Callable[[Clip], bool]
+    is_built_in: bool = False
 
 
 OTHER_NEEDS = (
@@ -107,8 +110,8 @@ OTHER_NEEDS = (
     OtherNeed("starting to walk", lambda clip: clip.kind is ClipKind.START),
     OtherNeed("stopping", lambda clip: clip.kind is ClipKind.STOP),
     OtherNeed("gestures", lambda clip: clip.kind is ClipKind.GESTURE),
-    OtherNeed("reaching with the right hand", lambda clip: _reaches(clip, "right")),
-    OtherNeed("reaching with the left hand", lambda clip: _reaches(clip, "left")),
+    OtherNeed("reaching with the right hand", lambda clip: _reaches(clip, "right"), True),
+    OtherNeed("reaching with the left hand", lambda clip: _reaches(clip, "left"), True),
     OtherNeed("jumping", lambda clip: clip.jump is not None),
 )
 
@@ -320,7 +323,8 @@ def coverage_of(library: MotionLibrary) -> tuple[Coverage, ...]:
         found.append(Coverage(need.name, origin_of(clips), tuple(clip.name for clip in clips)))
     for other in OTHER_NEEDS:
         clips = [clip for clip in library.clips if other.holds(clip)]
-        found.append(Coverage(other.name, origin_of(clips), tuple(clip.name for clip in clips)))
+        origin = BUILT_IN if not clips and other.is_built_in else origin_of(clips)
+        found.append(Coverage(other.name, origin, tuple(clip.name for clip in clips)))
     return tuple(found)
 
 
