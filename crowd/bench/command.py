@@ -190,39 +190,6 @@ def steerbench(
     return 0 if all(not result.problem for result in results if result.bodies == "people") else EXIT_FAILED
 
 
-@app.command()
-def picture(
-    scenario: Annotated[str, typer.Argument(help="Bundled name, .toml file, or SteerBench .xml file.")],
-    path: Annotated[Path, typer.Argument(help="Picture file to write.")],
-    seconds: Annotated[float, typer.Option(min=0.0, help="Simulated time before the picture, s.")] = 10.0,
-    eye: Annotated[str, typer.Option(help="Camera: x,y,z, m.")] = "14,5,-17",
-    target: Annotated[str, typer.Option(help="Point in the middle of the picture: x,y,z, m.")] = "0,0.8,-1",
-    seed: Annotated[int, typer.Option(help="Key of all random choices.")] = 0,
-) -> int:
-    """Draw a scenario as stick figures."""
-    from crowd.bench.stick_figures import draw
-    from crowd.scenario import load_scenario
-    from crowd.simulation import Simulation
-
-    places = [choose_point("--eye", eye), choose_point("--target", target)]
-    simulation = Simulation(load_scenario(scenario), seed=seed)
-    for _ in simulation.run(seconds=seconds):
-        pass
-    draw(simulation, path, *places)
-    return 0
-
-
-def choose_point(option: str, text: str) -> tuple[float, ...]:
-    """Three numbers separated by commas."""
-    try:
-        point = tuple(float(part) for part in text.split(","))
-    except ValueError as error:
-        raise SettingsError(describe(option, "must be three numbers", text, "x,y,z")) from error
-    if len(point) != 3:
-        raise SettingsError(describe(option, "must be three numbers", text, "x,y,z"))
-    return point
-
-
 def choose_scenes(text: str, known: tuple[str, ...]) -> list[str]:
     """Scenes of a comma-separated list; all when it is empty."""
     chosen = [name.strip() for name in text.split(",") if name.strip()] or list(known)

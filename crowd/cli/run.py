@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from crowd.cli.showing import CameraText
 from crowd.errors import SettingsError, describe
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from crowd.recording import Recorder
     from crowd.scenario import Scenario
     from crowd.simulation import Frame, Simulation
+    from crowd_viewer.camera import Camera
 
 EXIT_NOT_AS_EXPECTED = 1
 EXIT_INTERRUPTED = 130
@@ -44,6 +46,7 @@ def run(
     view: Annotated[bool, typer.Option("--view", help="Show the run in a window.")] = False,
     video: Annotated[Path | None, typer.Option(help="Write a video.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Write a picture of the last frame.")] = None,
+    camera: CameraText = None,
     record: Annotated[Path | None, typer.Option(help="Write a recording (HDF5).")] = None,
     metrics: Annotated[Path | None, typer.Option(help="Write what was measured (JSON).")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out.")] = None,
@@ -59,15 +62,17 @@ def run(
     from crowd.motion.importing.folder import load_or_import
     from crowd.scenario import load_scenario
 
-    require_viewer(picture, video, view=view)
+    chosen_camera = require_viewer(picture, video, view=view, camera=camera)
     require_folder("--record", record)
     require_folder("--metrics", metrics)
     loaded = load_scenario(scenario)
     library = None if motions is None else load_or_import(motions)
     simulation, compile_seconds = _prepare(loaded, seed, threads, characters, library, character or [])
-    sinks = [sink for sink in (_open_recorder(record, simulation), film(video, simulation)) if sink]
-    wall_seconds, was_stopped = _advance(simulation, sinks, seconds, is_shown=view)
-    draw_picture(picture, simulation)
+    sinks = [
+        sink for sink in (_open_recorder(record, simulation), film(video, simulation, chosen_camera)) if sink
+    ]
+    wall_seconds, was_stopped = _advance(simulation, sinks, seconds, chosen_camera, is_shown=view)
+    draw_picture(picture, simulation, chosen_camera)
     measured = measured_facts(simulation, wall_seconds, compile_seconds, was_stopped=was_stopped)
     if metrics is not None:
         write_json(metrics, measured)
@@ -149,7 +154,12 @@ class StopRequest:
 
 
 def _advance(
-    simulation: Simulation, sinks: Sequence[FrameSink], seconds: float | None, *, is_shown: bool
+    simulation: Simulation,
+    sinks: Sequence[FrameSink],
+    seconds: float | None,
+    camera: Camera | None,
+    *,
+    is_shown: bool,
 ) -> tuple[float, bool]:
     """Step to the end with a progress bar; returns the wall time, s, and whether Ctrl-C ended it."""
     from crowd.cli.progress import RunProgress
@@ -159,7 +169,7 @@ def _advance(
     frame_count = max(1, round((seconds or simulation.scenario.seconds) / simulation.dt))
     begin = time.perf_counter()
     request = StopRequest()
-    frames = _frames(simulation, frame_count, is_shown=is_shown)
+    frames = _frames(simulation, frame_count, camera, is_shown=is_shown)
     try:
         with request.watching(), RunProgress(simulation, frame_count) as progress:
             for frame in frames:
@@ -175,12 +185,14 @@ def _advance(
     return time.perf_counter() - begin, request.is_made
 
 
-def _frames(simulation: Simulation, frame_count: int, *, is_shown: bool) -> Generator[Frame, None, None]:
+def _frames(
+    simulation: Simulation, frame_count: int, camera: Camera | None, *, is_shown: bool
+) -> Generator[Frame, None, None]:
     """Step a simulation; in a window that is shown, as fast as time goes there and until it is closed."""
     if is_shown:
         from crowd_viewer.window import shown_frames
 
-        yield from shown_frames(simulation, frame_count)
+        yield from shown_frames(simulation, frame_count, camera=camera)
         return
     for _ in range(frame_count):
         yield simulation.step()

@@ -11,6 +11,10 @@ import typer
 if TYPE_CHECKING:
     from crowd.recording import Recording
     from crowd.simulation import Frame, Simulation
+    from crowd_viewer.camera import Camera
+
+
+CameraText = Annotated[str | None, typer.Option(help='{"eye": [x, y, z], "target": [x, y, z]}, m.')]
 
 
 class FrameSink(Protocol):
@@ -23,8 +27,10 @@ class FrameSink(Protocol):
         """Finish."""
 
 
-def require_viewer(picture: Path | None, video: Path | None, *, view: bool) -> None:
-    """Refuse what could not be shown, before a long run begins.
+def require_viewer(
+    picture: Path | None, video: Path | None, *, view: bool, camera: str | None = None
+) -> Camera | None:
+    """Refuse what could not be shown, before a long run begins; returns the camera that is asked for.
 
     Raises
     ------
@@ -32,7 +38,7 @@ def require_viewer(picture: Path | None, video: Path | None, *, view: bool) -> N
         Packages or OpenGL are missing; the message says what to install.
     """
     if picture is None and video is None and not view:
-        return
+        return None
     from crowd.cli.output import require_folder
 
     require_folder("--picture", picture)
@@ -54,24 +60,27 @@ def require_viewer(picture: Path | None, video: Path | None, *, view: bool) -> N
         require_pillow(picture)
     if picture is not None or video is not None:
         headless_context()
+    from crowd_viewer.camera import Camera
+
+    return None if camera is None else Camera.from_json(camera)
 
 
-def film(path: Path | None, simulation: Simulation) -> FrameSink | None:
+def film(path: Path | None, simulation: Simulation, camera: Camera | None) -> FrameSink | None:
     """What makes a video of a run."""
     if path is None:
         return None
     from crowd_viewer.video import Film
 
-    return Film(path, simulation)
+    return Film(path, simulation, camera=camera)
 
 
-def draw_picture(path: Path | None, simulation: Simulation) -> None:
+def draw_picture(path: Path | None, simulation: Simulation, camera: Camera | None) -> None:
     """Draw the present frame to a file."""
     if path is None:
         return
     from crowd_viewer.picture import render, write_picture
 
-    write_picture(path, render(simulation))
+    write_picture(path, render(simulation, camera=camera))
 
 
 def view(
@@ -88,7 +97,7 @@ def view(
     time: Annotated[float | None, typer.Option(help="Moment of the picture, s; the last one.")] = None,
     start: Annotated[float | None, typer.Option(help="Time at which the video begins, s.")] = None,
     stop: Annotated[float | None, typer.Option(help="Time at which the video ends, s.")] = None,
-    camera: Annotated[str | None, typer.Option(help='{"eye": [x, y, z], "target": [x, y, z]}, m.')] = None,
+    camera: CameraText = None,
     character: Annotated[
         list[Path] | None,
         typer.Option(help="Skinned glTF character for people on trajectories; may be repeated."),
@@ -99,16 +108,13 @@ def view(
 ) -> int:
     """Watch a recording, or people who walk along trajectories of other programs."""
     is_window = video is None and picture is None and record is None
-    require_viewer(picture, video, view=is_window)
+    chosen = require_viewer(picture, video, view=is_window, camera=camera)
     from crowd.cli.output import require_folder
 
     require_folder("--record", record)
     with _opened(shown, record, character or []) as opened:
         if picture is None and video is None and not is_window:
             return 0
-        from crowd_viewer.camera import Camera
-
-        chosen = None if camera is None else Camera.from_json(camera)
         if picture is not None:
             from crowd_viewer.picture import render, write_picture
 
