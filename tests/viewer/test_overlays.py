@@ -71,6 +71,28 @@ def test_every_layer_of_a_run_draws_lines_that_are_finite(crowded, layer):
     assert np.isfinite(np.concatenate(lines.end)).all()
 
 
+def test_gaze_and_reach_targets_are_joined_with_eyes_and_hands():
+    simulation = crowd.Simulation(crowd.load_scenario("plaza"), seed=3, characters=12, threads=1)
+    simulation.step()
+    state, skeleton = simulation.state, simulation.model.skeleton
+    row = int(np.flatnonzero(state.is_active)[0])
+    point = state.position_world[row] + [2.0 * np.sin(state.yaw[row]), 1.5, 2.0 * np.cos(state.yaw[row])]
+    simulation.commands.look_at([row], point)
+    for _ in range(30):
+        simulation.step()
+    state.reach_stage[row, 1] = 1
+    state.reach_target_world[row, 1] = (1.0, 2.0, 3.0)
+    lines = Collected()
+    LAYERS["targets"](lines, seen_of(simulation, row))
+    start, end = np.concatenate(lines.start), np.concatenate(lines.end)
+    joints = simulation.joint_positions_world()[row]
+    eyes = joints[[skeleton.joint("left_eye"), skeleton.joint("right_eye")]].mean(axis=0)
+    to_point = np.linalg.norm(end - point, axis=1) < 1e-5
+    assert np.linalg.norm(start[to_point] - eyes, axis=1).min() < 1e-4
+    to_hand = np.linalg.norm(end - [1.0, 2.0, 3.0], axis=1) < 1e-9
+    assert start[to_hand][0] == pytest.approx(joints[skeleton.joint("left_hand")], abs=1e-4)
+
+
 def test_nobody_picked_and_nobody_there_draw_nothing_of_the_picked(crowded):
     for layer in ("neighbours", "half-planes", "limits"):
         lines = Collected()

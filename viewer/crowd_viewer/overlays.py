@@ -244,10 +244,10 @@ def _targets(lines: Lines, seen: Seen) -> None:
         looks = share > 0.0
         eyes = joints[:, [skeleton.joint("left_eye"), skeleton.joint("right_eye")]].mean(axis=1)
         lines.add(eyes[looks], gaze[looks].astype(np.float64), GAZE)
-    target, share = seen.of_rows("reach_target_world"), seen.of_rows("reach_weight")
-    if target is not None and share is not None:
+    target, stage = seen.of_rows("reach_target_world"), seen.of_rows("reach_stage")
+    if target is not None and stage is not None:
         for side, name in enumerate(("right_hand", "left_hand")):
-            reaches = share[:, side] > 0.0
+            reaches = stage[:, side] > 0
             points = target[reaches, side].astype(np.float64)
             lines.add(joints[reaches, skeleton.joint(name)], points, (*REACH[:3], 0.5))
             for axis in 0.06 * np.eye(3):
