@@ -97,18 +97,19 @@ def simple_limbs(skeleton: Skeleton) -> Limbs:
     def at(joint: str, *offset: float) -> FloatArray:
         return np.asarray(rest[skeleton.joint(joint)] + unit * np.array(offset or (0.0, 0.0, 0.0)))
 
+    # Those that far people are drawn with come first: trunk, head, arms and legs.
     for sign in (1.0, -1.0):
         add("spine_2", at("spine_1", 0.05 * sign, -0.03, 0.0), at("spine_3", 0.056 * sign, 0.0, 0.0), 0.097)
         add("spine_3", at("spine_3", 0.058 * sign, 0.0, 0.0), at("spine_4", 0.066 * sign, 0.0, 0.0), 0.103)
-    add("spine_2", at("pelvis", 0.0, 0.0, 0.012), at("spine_3", 0.0, 0.03, 0.02), 0.092)
-    add("spine_4", at("spine_3", 0.0, 0.03, 0.018), at("spine_4", 0.0, 0.03, 0.014), 0.098)
-    add("pelvis", at("pelvis", -0.062, -0.01, -0.008), at("pelvis", 0.062, -0.01, -0.008), 0.108)
     add("head", at("head", 0.0, -0.005, 0.035), at("head", 0.0, 0.048, 0.018), 0.088)
     for side in ("left", "right"):
         add(f"{side}_thigh", at(f"{side}_thigh"), at(f"{side}_shank"), 0.072)
         add(f"{side}_shank", at(f"{side}_shank"), at(f"{side}_foot", 0.0, 0.02, 0.0), 0.050)
         add(f"{side}_upper_arm", at(f"{side}_upper_arm", 0.0, -0.01, 0.0), at(f"{side}_forearm"), 0.046)
         add(f"{side}_forearm", at(f"{side}_forearm"), at(f"{side}_hand"), 0.036)
+    add("pelvis", at("pelvis", -0.062, -0.01, -0.008), at("pelvis", 0.062, -0.01, -0.008), 0.108)
+    add("spine_2", at("pelvis", 0.0, 0.0, 0.012), at("spine_3", 0.0, 0.03, 0.02), 0.092)
+    add("spine_4", at("spine_3", 0.0, 0.03, 0.018), at("spine_4", 0.0, 0.03, 0.014), 0.098)
     for side in ("left", "right"):
         add(
             f"{side}_foot", at(f"{side}_foot", 0.0, -0.030, -0.025), at(f"{side}_toe", 0.0, 0.014, 0.0), 0.039
@@ -185,16 +186,14 @@ def _extra_limbs(
 
 
 def worn_where(recipe: Recipe) -> FloatArray:
-    """Heights at which clothes end on limbs, for shaders. (3, 4).
+    """Heights at which clothes end on limbs, for shaders, m. (4,).
 
-    Sleeve, hem of the top, hem of the bottom, shoe; then whether there is hair, and zeros.
+    Sleeve, hem of the top, hem of the bottom, and shoe, with a minus where there is no hair.
     """
     outfit = recipe.outfit
     has_hair = outfit.hair != "bald" and outfit.hat != "scarf"
-    rows = np.zeros((3, 4))
-    rows[0] = outfit.sleeve, outfit.hem, outfit.bottom_hem if outfit.bottom else outfit.hem, outfit.shoe
-    rows[1, 0] = has_hair
-    return rows
+    bottom_hem = outfit.bottom_hem if outfit.bottom else outfit.hem
+    return np.array([outfit.sleeve, outfit.hem, bottom_hem, outfit.shoe if has_hair else -outfit.shoe])
 
 
 def landmarks(skeleton: Skeleton) -> dict[str, str]:

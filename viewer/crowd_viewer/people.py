@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 MESH_LEVELS = 3
 LEVELS = 5
-FEW_LIMBS = 12
+FEW_LIMBS = 13
 """Limbs of people who are far away: trunk, head, arms and legs."""
 PALETTE_UNIT, ROOTS_UNIT, LOOKS_UNIT, LIMBS_UNIT, SHADOW_UNIT = range(5)
 
@@ -277,6 +277,7 @@ class People:
                 ("view.glsl", "people.glsl", "lighting.glsl", "clothes.glsl", "capsule.frag"),
                 TOWARDS=towards,
                 SMALLEST_COVER="0.02" if self.quality.samples else "0.5",
+                PLAIN="",
                 **constants,
                 **kinds,
                 **deep,
@@ -312,7 +313,7 @@ class People:
         table = np.zeros((self.build_count, self._limb_count + 1, 3, 4), np.float32)
         table[:, :, 0, 3] = 1e-6
         for row, body in zip(table, self.bodies, strict=True):
-            row[0] = worn_where(body.recipe)
+            row[0, 0] = worn_where(body.recipe)
             limbs, filled = body.limbs, slice(1, len(body.limbs.joint) + 1)
             row[filled, 0, :3] = limbs.start - rest[limbs.joint]
             row[filled, 0, 3] = limbs.radius

@@ -20,6 +20,8 @@ class Quality:
         Multisampling; 0 without.
     shadow_size : int
         Texels along each side of the shadow map; 0 without shadows.
+    shadow_taps : int
+        Places at which the rim of a shadow is looked up, 1 to 12.
     shadow_reach : float
         Half of the side of the ground on which shadows fall where people are near, m.
     has_far_shadows : bool
@@ -30,11 +32,12 @@ class Quality:
     mesh_count: int
     samples: int
     shadow_size: int
+    shadow_taps: int
     shadow_reach: float
     has_far_shadows: bool
 
 
-FINE = Quality((150.0, 70.0, 34.0, 14.0), 2000, 4, 4096, 45.0, True)
+FINE = Quality((150.0, 70.0, 34.0, 14.0), 2000, 4, 4096, 12, 45.0, True)
 """For pictures, videos and graphics cards."""
-FAST = Quality((400.0, 260.0, 160.0, 26.0), 12, 0, 1024, 25.0, False)
+FAST = Quality((300.0, 170.0, 70.0, 34.0), 40, 0, 1024, 4, 25.0, False)
 """For windows where the processor draws."""

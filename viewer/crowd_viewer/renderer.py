@@ -67,7 +67,7 @@ class Renderer:
         self.things = Things(context, scene.objects)
         self.ground_map: GroundMap | None = None
         """Drawn on the ground, below the people."""
-        self._view = context.buffer(reserve=192, dynamic=True)
+        self._view = context.buffer(reserve=208, dynamic=True)
 
     def resize(self, size: tuple[int, int]) -> None:
         """Draw pictures of another size from now on."""
@@ -180,6 +180,10 @@ class Renderer:
             low_z - origin[2],
             high_x - origin[0],
             high_z - origin[2],
+            float(self.quality.shadow_taps),
+            0.0,
+            0.0,
+            0.0,
         ]
         self._view.write(np.array(values, np.float32).tobytes())
         self._view.bind_to_uniform_block(VIEW_BINDING)

@@ -9,7 +9,6 @@ flat in vec3 side;
 flat in vec2 limb;
 flat in int worn;
 flat in vec4 ends;
-flat in float has_hair;
 flat in int slot;
 
 #if defined(IDENTITY)
@@ -44,7 +43,7 @@ void main() {
     vec3 rest_normal = turned(vec4(rotation.x, -rotation.yzw), n);
     float share = clamp(0.5 + 0.5 * across.y / max(start.w, 1e-4), 0.0, 1.0);
     vec3 rest_place = mix(start.xyz, end.xyz, share) + end.w * rest_normal;
-    int piece = worn > 0 ? worn - 1 : piece_at(rest_place, limb, ends, has_hair > 0.5);
+    int piece = worn > 0 ? worn - 1 : piece_at(rest_place, limb, vec4(ends.xyz, abs(ends.w)), ends.w > 0.0);
     Material material = clothes(slot, piece, rest_place, rest_normal);
     vec3 light = lit(material.colour, material.gloss, place, normal);
     colour = displayed(hazy(light, place));

@@ -1,6 +1,6 @@
 // One quad for each limb that faces the eye; the fragment shader rounds it.
 in vec2 corner;
-uniform sampler2D limbs;   // a row a build: three texels of where clothes end, then three a limb:
+uniform sampler2D limbs;   // a row a build: three texels, the first of where clothes end, then three a limb:
                            // start and radius, end and joint, rest and part
 uniform int limb_count;
 out vec2 across;
@@ -14,7 +14,6 @@ flat out vec3 side;
 flat out vec2 limb;
 flat out int worn;         // material + 1, 0 where it follows from the place
 flat out vec4 ends;
-flat out float has_hair;
 flat out int slot;
 
 void main() {
@@ -49,7 +48,6 @@ void main() {
     limb = vec2(c.w == 1.0 || c.w == 2.0 ? 1.0 : 0.0, c.w == 2.0 ? 1.0 : 0.0);
     worn = c.w > 7.5 ? int(c.w - 6.5) : 0;
     ends = texelFetch(limbs, ivec2(0, root.build), 0);
-    has_hair = texelFetch(limbs, ivec2(1, root.build), 0).x;
     rotation = turn;
     rotation_yaw = vec2(root.sine, root.cosine);
     slot = root.slot;

@@ -13,6 +13,8 @@ vec4 look(int slot, int column) {
 
 const int SKIN = 0, TOP = 1, BOTTOM = 2, HAIR = 3, SHOE = 4, EXTRA = 5;
 
+// Capsules are small on the screen: PLAIN leaves out what is not seen there.
+#ifndef PLAIN
 uint mixed(uint x) {
     x ^= x >> 16; x *= 0x7feb352dU; x ^= x >> 15; x *= 0x846ca68bU; x ^= x >> 16;
     return x;
@@ -56,7 +58,7 @@ Material face(vec4 skin, vec3 hair, vec3 at, float pixel) {
         // Beard: below a line from the ear to the upper lip, around the mouth.
         float lips = length(vec2(side * 0.40, at.y - MOUTH));
         float jaw = smoothstep(0.006, -0.006, at.y - (MOUTH + 0.012 + 0.35 * max(0.060 - ahead, 0.0)));
-        colour = mix(colour, mix(colour, hair * 0.8, 0.8), skin.w * jaw * smoothstep(0.0, 0.025, ahead) * smoothstep(CHIN - 0.006, CHIN + 0.006, at.y) * smoothstep(0.010, 0.014, lips));
+        colour = mix(colour, mix(colour, hair * 0.8, 0.8), skin.w * jaw * smoothstep(0.0, 0.025, ahead) * smoothstep(CHIN - 0.006, CHIN + 0.006, at.y) * smoothstep(0.0080, 0.0115, lips));
         if (ahead > 0.045) {
             float cheek = length(vec2(side - 0.040, at.y - EYES + 0.036)) / 0.030;
             colour = mix(colour, colour * vec3(1.05, 0.82, 0.78), 0.5 * exp(-cheek * cheek));
@@ -77,6 +79,8 @@ Material face(vec4 skin, vec3 hair, vec3 at, float pixel) {
     return Material(colour, 0.06);
 }
 
+#endif
+
 Material top_cloth(int slot, vec3 at, float pixel) {
     vec4 top = look(slot, 1), accent = look(slot, 5), cut = look(slot, 6);
     vec3 cloth = top.rgb;
@@ -84,7 +88,10 @@ Material top_cloth(int slot, vec3 at, float pixel) {
     int pattern = int(accent.w + 0.5);
     float wave = abs(fract(at.y * cut.z) - 0.5) * 2.0;
     if (pattern == 1) cloth = mix(cloth, accent.rgb, smoothstep(0.5 - 4.0 * pixel * cut.z, 0.5 + 4.0 * pixel * cut.z, wave));
-    if (pattern == 2 && at.y < CHEST + 0.06 && at.y > CHEST - 0.06) cloth = accent.rgb;
+    if (pattern == 2) cloth = mix(cloth, accent.rgb, 1.0 - smoothstep(0.06 - 0.5 * pixel, 0.06 + 0.5 * pixel, abs(at.y - CHEST)));
+#ifdef PLAIN
+    if (pattern == 4 && at.z > 0.0) cloth = mix(cloth, accent.rgb, step(side, 0.03));
+#else
     if (pattern == 3 && at.z > 0.0) {
         vec2 print = vec2(side / 0.075, (at.y - CHEST + 0.05) / 0.060);
         cloth = mix(cloth, accent.rgb, 0.85 * (1.0 - smoothstep(0.9, 0.95 + 8.0 * pixel, length(print))));
@@ -95,22 +102,28 @@ Material top_cloth(int slot, vec3 at, float pixel) {
         cloth *= 1.0 - 0.5 * (1.0 - smoothstep(0.002, 0.006 + pixel, abs(side - open)));
     }
     if (pattern == 5 && at.z > 0.0 && side < 0.004 + 0.5 * pixel) cloth *= 0.5;
+#endif
     return Material(cloth, 0.02);
 }
 
 // `piece`: what it belongs to; `at` and `normal` in rest pose.
 Material clothes(int slot, int piece, vec3 at, vec3 normal) {
     float pixel = fwidth(at.y) + 1e-5;
+#ifdef PLAIN
+    if (piece == SKIN) return Material(look(slot, 0).rgb, 0.06);
+    if (piece == HAIR) return Material(look(slot, 3).rgb * (0.87 + 0.25 * normal.y), 0.10);
+#else
     if (piece == SKIN) return face(look(slot, 0), look(slot, 3).rgb, at, pixel);
-    if (piece == TOP) return top_cloth(slot, at, pixel);
-    if (piece == BOTTOM) {
-        float belt = look(slot, 6).x * step(look(slot, 7).x - 0.035, at.y);
-        return Material(mix(look(slot, 2).rgb, vec3(0.05, 0.035, 0.025), belt), 0.03);
-    }
     if (piece == HAIR) {
         float around = atan(at.x, at.z - HEAD_MIDDLE + 0.02);
         float strands = mix(noise(vec3(around * 30.0, at.y * 11.0, 3.0)), 0.5, smoothstep(0.002, 0.008, pixel));
         return Material(look(slot, 3).rgb * (0.62 + 0.5 * strands + 0.25 * normal.y), 0.10);
+    }
+#endif
+    if (piece == TOP) return top_cloth(slot, at, pixel);
+    if (piece == BOTTOM) {
+        float belt = look(slot, 6).x * step(look(slot, 7).x - 0.035, at.y);
+        return Material(mix(look(slot, 2).rgb, vec3(0.05, 0.035, 0.025), belt), 0.03);
     }
     if (piece == SHOE) {
         vec4 shoe = look(slot, 4);

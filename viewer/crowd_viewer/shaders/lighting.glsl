@@ -8,9 +8,10 @@ const vec3 HORIZON = vec3(0.74, 0.86, 1.02);
 const float HAZE = 0.0016;
 const float EXPOSURE = 0.60;
 
+// The first four are around the middle by themselves.
 const vec2 TAPS[12] = vec2[](
-    vec2(-0.326, -0.406), vec2(-0.840, -0.074), vec2(-0.696, 0.457), vec2(-0.203, 0.621),
-    vec2(0.962, -0.195), vec2(0.473, -0.480), vec2(0.519, 0.767), vec2(0.185, -0.893),
+    vec2(-0.696, 0.457), vec2(0.519, 0.767), vec2(0.473, -0.480), vec2(-0.326, -0.406),
+    vec2(0.962, -0.195), vec2(-0.840, -0.074), vec2(-0.203, 0.621), vec2(0.185, -0.893),
     vec2(0.507, 0.064), vec2(0.896, 0.412), vec2(-0.322, -0.933), vec2(-0.792, -0.598));
 
 float sunlight(vec3 place, vec3 normal) {
@@ -20,9 +21,10 @@ float sunlight(vec3 place, vec3 normal) {
     if (min(rim.x, rim.y) <= 0.0 || at.z >= 1.0) return 1.0;
     vec2 step_size = ahead.w / vec2(textureSize(shadow_map, 0));
     float lit = 0.0;
-    for (int k = 0; k < 12; k++)
+    int taps = int(care.x);
+    for (int k = 0; k < taps; k++)
         lit += texture(shadow_map, vec3(at.xy + TAPS[k] * step_size, at.z - sun.w));
-    return mix(1.0, lit / 12.0, smoothstep(0.0, 0.04, min(rim.x, rim.y)));
+    return mix(1.0, lit / care.x, smoothstep(0.0, 0.04, min(rim.x, rim.y)));
 }
 
 vec3 sky(vec3 direction) {

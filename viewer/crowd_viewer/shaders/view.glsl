@@ -6,6 +6,7 @@ layout(std140) uniform View {
     vec4 ahead;          // w: softness of shadows in texels
     vec4 sun;            // direction towards it; w: depth by which shadows stand off, 0 without any
     vec4 ground;         // lowest x, lowest z, highest x, highest z
+    vec4 care;           // x: places at which the rim of a shadow is looked up; no clouds below 8
 };
 
 vec3 towards_eye(vec3 place) {
