@@ -15,6 +15,7 @@ from crowd import checkpoint
 from crowd.checkpoint import Stateful
 from crowd.commands import Commands
 from crowd.controllers.animation import Animation
+from crowd.controllers.carrying import Carrying
 from crowd.controllers.controller import Controller, Step
 from crowd.controllers.foot_lock import FootLock
 from crowd.controllers.gaze import Gaze
@@ -114,6 +115,7 @@ class Simulation:
         self.animation = Animation(capacity)
         self.joints = Joints(self.model.skeleton, capacity)
         self.grab = Grab(self.model, self.objects, self.joints)
+        self.carrying = Carrying(self.model, self.grab)
         self.gaze = Gaze(
             self.model.skeleton, capacity, self.navigator.avoidance, self.objects, self.model.placed
         )
@@ -122,6 +124,7 @@ class Simulation:
             self.idle,
             self.locomotion,
             self.animation,
+            self.carrying,
             self.grab,
             self.gaze,
         )

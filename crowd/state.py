@@ -204,6 +204,17 @@ class State:
     finger_contact: ByteArray = _array(2, 15, dtype=np.uint8)
     """1 where the segment touches the object. (character, 2, 15)"""
 
+    is_carrying: BoolArray = _array(dtype=np.bool_)
+    """Both hands hold an object before the body. (character,)"""
+    carry_progress: FloatArray = _array()
+    """Progress from where the object was taken to where it is carried, 0 to 1. (character,)"""
+    carry_position: FloatArray = _array(3)
+    """Object in the root frame when carrying began, m. (character, 3)"""
+    carry_rotation: FloatArray = _array(4)
+    """Its rotation in the root frame. (character, 4)"""
+    carry_target_world: FloatArray = _array(2, 3)
+    """Targets that carrying gave the hands last, m. (character, 2, 3)"""
+
     foot_contact: ByteArray = _array(2, dtype=np.uint8)
     """Contact of each foot: 0 swing, 1 heel, 2 ball. (character, 2)"""
     foot_point_world: FloatArray = _array(2, 2, 3)

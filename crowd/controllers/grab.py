@@ -57,7 +57,7 @@ class GrabSettings:
     """s, > 0. From a grip to the open hand."""
     shape_time: float = 0.4
     """s, > 0. From the fingers of other layers to the open hand, and back."""
-    near: float = 0.002
+    near: float = 0.0015
     """m. A hand this near to its place on the object closes."""
     near_angle: float = 0.045
     """rad. Likewise for its rotation."""

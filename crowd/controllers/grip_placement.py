@@ -14,8 +14,10 @@ from crowd_kernels.grasp import HandTable
 from crowd_kernels.hand_placement import PALM_GAP, place_hands
 from crowd_kernels.hand_pose import hands_in_world
 
-TALL = 0.06
+TALL = 0.05
 """Things whose half height is more are taken from the side, lower ones more from above, m."""
+ABOVE = 0.15
+"""So are things that are not this far below the shoulder, m."""
 ROLL_TALL, ROLL_LOW = 0.30, 1.15
 """Turn of the back of the hand from the side upwards, rad."""
 DESCENT = 0.35
@@ -116,6 +118,11 @@ class GripPlacement:
             position[:, side] = back * (reach + PALM_GAP)[:, None] - scale * on_palm
         return position, rotation, width <= WIDEST
 
+    def depths(self, items: IntArray, rotation: FloatArray) -> FloatArray:
+        """Reach of objects from their centres backwards when they are turned (A, 4), m. (A,)"""
+        back = rotate(conjugate(rotation), np.array([0.0, 0.0, -1.0]))
+        return np.array([self._support(item, way) for item, way in zip(items, back, strict=True)])
+
     def _support(self, item: int, way: FloatArray) -> float:
         """Reach of an object from its centre along a unit vector in its frame, m."""
         half = self._shapes.half_size[item]
@@ -150,7 +157,8 @@ class GripPlacement:
                 for item, turn in zip(items.tolist(), objects.rotation_world[items], strict=True)
             ]
         )
-        roll = np.where(height > TALL, ROLL_TALL, ROLL_LOW)[:, None]
+        is_from_side = (height > TALL) | (center[:, 1] > shoulder[:, 1] - ABOVE)
+        roll = np.where(is_from_side, ROLL_TALL, ROLL_LOW)[:, None]
         up = np.cross(fingers, outward) * np.where(side == 1, 1.0, -1.0)[:, None]
         back = np.cos(roll) * outward + np.sin(roll) * up
         held = objects.holder[items] >= 0
