@@ -9,8 +9,8 @@ from benchmarks.case import Case
 from crowd_kernels import _jit
 from crowd_kernels.view import levels_crowd, pack_crowd, sort_rows
 
-JOINTS, BUILDS, LEVELS = 56, 4, 5
-FEW_JOINTS = 20
+JOINTS, BUILDS, LEVELS = 56, 19, 5
+FEW_JOINTS = 21
 LEAST_HEIGHT = np.array([150.0, 70.0, 34.0, 14.0])
 MESH_LEVELS = 3
 LARGEST_UPLOAD = 8 << 20

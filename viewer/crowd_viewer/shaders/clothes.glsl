@@ -64,16 +64,18 @@ Material face(vec4 skin, vec3 hair, vec3 at, float pixel) {
             colour = mix(colour, colour * vec3(1.05, 0.82, 0.78), 0.5 * exp(-cheek * cheek));
             vec2 eye = vec2(side - 0.0315, at.y - EYES - 0.0005);
             float open = length(vec2(eye.x, eye.y * (eye.y > 0.0 ? 2.5 : 2.1)));
-            float white = 1.0 - smoothstep(0.0125, 0.0135 + pixel, open);
+            // What is smaller than a pixel fades instead of growing to its size.
+            float clear = min(0.0035 / pixel, 1.0);
+            float white = clear * (1.0 - smoothstep(0.0125, 0.0135 + pixel, open));
             colour = mix(colour, vec3(0.50, 0.47, 0.45), 0.85 * white);
             vec3 iris = mix(vec3(0.035, 0.020, 0.013), vec3(0.10, 0.13, 0.15), step(0.35, skin.r) * step(0.12, hair.r));
             colour = mix(colour, iris, white * (1.0 - smoothstep(0.0052, 0.0062 + pixel, length(eye))));
             float lid = abs(open - 0.0135) + max(-eye.y, 0.0) * 0.6;
-            colour = mix(colour, vec3(0.05, 0.03, 0.025), 0.8 * (1.0 - smoothstep(0.0014, 0.0032 + pixel, lid)));
+            colour = mix(colour, vec3(0.05, 0.03, 0.025), 0.8 * clear * (1.0 - smoothstep(0.0014, 0.0032 + pixel, lid)));
             float brow = length(vec2((side - 0.034) * 0.42, (at.y - EYES - 0.0185 + 6.0 * (side - 0.03) * (side - 0.03)) * 2.2));
-            colour = mix(colour, hair * 0.7 + 0.1 * skin.rgb, 0.85 * (1.0 - smoothstep(0.0065, 0.009 + pixel, brow)));
-            colour = mix(colour, skin.rgb * vec3(0.80, 0.52, 0.50), 0.65 * (1.0 - smoothstep(0.0070, 0.0105 + pixel, lips)));
-            colour *= 1.0 - 0.5 * (1.0 - smoothstep(0.0008, 0.0025 + pixel, abs(at.y - MOUTH) + max(side - 0.020, 0.0)));
+            colour = mix(colour, hair * 0.7 + 0.1 * skin.rgb, 0.85 * clear * (1.0 - smoothstep(0.0065, 0.009 + pixel, brow)));
+            colour = mix(colour, skin.rgb * vec3(0.80, 0.52, 0.50), 0.65 * clear * (1.0 - smoothstep(0.0070, 0.0105 + pixel, lips)));
+            colour *= 1.0 - 0.5 * clear * (1.0 - smoothstep(0.0008, 0.0025 + pixel, abs(at.y - MOUTH) + max(side - 0.020, 0.0)));
         }
     }
     return Material(colour, 0.06);
