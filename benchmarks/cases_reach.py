@@ -73,7 +73,7 @@ def check(hands: Hands) -> str | None:
     inverse = 1.0 / np.maximum(distance, 1e-6)
     share = inverse - inverse[:, -1:]
     share /= share.sum(axis=1, keepdims=True)
-    wanted = np.zeros((len(near), len(hands.space.first_key)))
+    wanted = np.zeros((len(near), len(hands.space.keys.first_key)))
     found = np.zeros_like(wanted)
     rows: Any = np.arange(len(near))
     for k in range(NEAREST):

@@ -15,6 +15,7 @@ from crowd.motion.clip import ClipKind
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
+HANDS = ("right", "left")
 Characters = int | slice | Sequence[int] | npt.NDArray[np.integer]
 
 
@@ -203,6 +204,86 @@ class Commands:
     def look_away(self, characters: Characters) -> None:
         """Let the gaze of characters fade; idle glances may come again."""
         self._simulation.gaze.release(self._simulation.state, self._rows(characters))
+
+    def reach(
+        self,
+        characters: Characters,
+        target_world: npt.ArrayLike,
+        hand: str | None = None,
+        *,
+        rotation_world: npt.ArrayLike | None = None,
+        seconds: float | None = None,
+        hold: float | None = None,
+    ) -> None:
+        """Let characters reach for points with a hand, until `end_reach`.
+
+        A hand that already reaches goes on to the new target. How it stands shows in ``state.reach_status``:
+        what is out of reach is approached as near as can be, what cannot be reached for is refused.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+        target_world : (3,) or (M, 3) array
+            Where the wrist shall come, m.
+        hand : {"right", "left"}, optional
+            The hand on the target's side when left out.
+        rotation_world : (4,) or (M, 4) array, optional
+            Rotation (w, x, y, z) of the hand joint.
+        seconds : float, optional
+            Time to the target, s, > 0; as people do when left out.
+        hold : float, optional
+            Time at the target before the hand returns, s, >= 0; until `end_reach` when left out.
+
+        Raises
+        ------
+        SettingsError
+            A target is of the wrong shape, a hand is unknown, or a time is out of range.
+        """
+        rows, simulation = self._rows(characters), self._simulation
+        targets = np.asarray(target_world, np.float64)
+        if targets.shape not in ((3,), (rows.size, 3)):
+            raise SettingsError(
+                describe("reach", "target has the wrong shape", targets.shape, f"(3,) or ({rows.size}, 3)")
+            )
+        if seconds is not None and not 0.0 < seconds < math.inf:
+            raise SettingsError(describe("reach", "seconds are out of range", seconds, "> 0 s"))
+        if hold is not None and not hold >= 0.0:
+            raise SettingsError(describe("reach", "hold is out of range", hold, ">= 0 s"))
+        rotations = None if rotation_world is None else np.asarray(rotation_world, np.float64)
+        if rotations is not None:
+            if rotations.shape not in ((4,), (rows.size, 4)):
+                raise SettingsError(
+                    describe(
+                        "reach", "rotation has the wrong shape", rotations.shape, f"(4,) or ({rows.size}, 4)"
+                    )
+                )
+            length = np.linalg.norm(rotations, axis=-1, keepdims=True)
+            rotations = rotations / np.where(length > 0.0, length, 1.0)
+        hands = self._hands("reach", rows, hand, np.broadcast_to(targets, (rows.size, 3)))
+        simulation.reach.start(simulation.state, rows, hands, targets, rotations, seconds=seconds, hold=hold)
+
+    def end_reach(self, characters: Characters, hand: str | None = None) -> None:
+        """Let hands of characters return to rest; both when none is named."""
+        rows, simulation = self._rows(characters), self._simulation
+        names = HANDS if hand is None else (hand,)
+        for name in names:
+            simulation.reach.end(simulation.state, rows, self._hand("end_reach", name))
+
+    def _hands(
+        self, what: str, rows: npt.NDArray[np.int32], hand: str | None, targets: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.int64]:
+        """Hand of each character: the named one, or that on the side of its target."""
+        if hand is not None:
+            return np.full(rows.size, self._hand(what, hand))
+        state = self._simulation.state
+        away = targets - state.position_world[rows]
+        to_left = np.cos(state.yaw[rows]) * away[:, 0] - np.sin(state.yaw[rows]) * away[:, 2]
+        return (to_left > 0.0).astype(np.int64)
+
+    def _hand(self, what: str, hand: str) -> int:
+        if hand not in HANDS:
+            raise SettingsError(describe(what, "unknown hand", hand, " or ".join(HANDS)))
+        return HANDS.index(hand)
 
     def _rows(self, characters: Characters) -> npt.NDArray[np.int32]:
         capacity = self._simulation.state.capacity

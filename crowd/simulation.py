@@ -22,6 +22,7 @@ from crowd.controllers.gaze import Gaze
 from crowd.controllers.grab import Grab
 from crowd.controllers.idle import Idle
 from crowd.controllers.locomotion import Locomotion
+from crowd.controllers.reach import Reach
 from crowd.controllers.world_offset import WorldOffset
 from crowd.errors import SettingsError, describe
 from crowd.joints import Joints
@@ -113,6 +114,8 @@ class Simulation:
         self.idle = Idle(capacity)
         self.locomotion = Locomotion(capacity)
         self.animation = Animation(capacity)
+        people = self.model.people
+        self.reach = Reach(self.model.library, people.segment_scale, people.stature)
         self.joints = Joints(self.model.skeleton, capacity)
         self.grab = Grab(self.model, self.objects, self.joints)
         self.carrying = Carrying(self.model, self.grab)
@@ -125,6 +128,7 @@ class Simulation:
             self.locomotion,
             self.animation,
             self.carrying,
+            self.reach,
             self.grab,
             self.gaze,
         )

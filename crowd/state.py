@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.reach_blend import SLOTS
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -164,6 +165,9 @@ class State:
     pose_pelvis: Float32Array = _array(3, dtype=np.float32)
     """Pelvis in the root frame at leg scale 1, m. (character, 3)"""
 
+    is_seated: BoolArray = _array(dtype=np.bool_)
+    """The character sits on a seat: it reaches with the upper body alone. (character,)"""
+
     reach_stage: ByteArray = _array(2, dtype=np.uint8)
     """Stage of each hand's reach, right and left: 0 none, 1 move, 2 hold, 3 return. (character, 2)"""
     reach_status: ByteArray = _array(2, dtype=np.uint8)
@@ -176,6 +180,46 @@ class State:
     """A rotation is asked for. (character, 2)"""
     reach_point_hand: FloatArray = _array(2, 3)
     """Point in the hand joint's frame that comes to the target, 0 for the wrist, m. (character, 2, 3)"""
+    reach_seconds: FloatArray = _array(2)
+    """Time to the target that is asked for, 0 for a natural one, s. (character, 2)"""
+    reach_hold_left: FloatArray = _array(2)
+    """Time for which the hand still stays at the target, s; infinite until told. (character, 2)"""
+    reach_course: FloatArray = _array(2)
+    """Course of the reach: 0 at rest, 1 at the target, 2 at rest again. (character, 2)"""
+    reach_course_rate: FloatArray = _array(2)
+    """Rate of change of `reach_course`, 1/s. (character, 2)"""
+    reach_weight: FloatArray = _array(2)
+    """Share of the reach in the pose, 0 to 1. (character, 2)"""
+    reach_seen: FloatArray = _array(2, 3)
+    """Target in the root frame as last seen, m. (character, 2, 3)"""
+    reach_seen_velocity: FloatArray = _array(2, 3)
+    """Its velocity, m/s. (character, 2, 3)"""
+    reach_offset: FloatArray = _array(2, 3)
+    """Goal of the hand against `reach_seen`: what is left of the way to a new target, m. (character, 2, 3)"""
+    reach_offset_velocity: FloatArray = _array(2, 3)
+    """m/s. (character, 2, 3)"""
+    reach_offset_acceleration: FloatArray = _array(2, 3)
+    """m/s^2. (character, 2, 3)"""
+    reach_time_left: FloatArray = _array(2)
+    """Time until the goal is at the target, s. (character, 2)"""
+    reach_plan_time: FloatArray = _array(2, fill=1)
+    """Length of the present way to a new target, s. (character, 2)"""
+    reach_bulge: FloatArray = _array(2, 3)
+    """Farthest departure of that way from a straight line, m. (character, 2, 3)"""
+    reach_rotation: FloatArray = _array(2, 4)
+    """Rotation of the goal in the root frame. (character, 2, 4)"""
+    reach_turn_velocity: FloatArray = _array(2, 3)
+    """Its angular velocity against that of the target, rad/s. (character, 2, 3)"""
+    reach_turn_acceleration: FloatArray = _array(2, 3)
+    """rad/s^2. (character, 2, 3)"""
+    reach_rotation_share: FloatArray = _array(2)
+    """How far the rotation of the goal counts, 0 to 1. (character, 2)"""
+    reach_example: IntArray = _array(2, SLOTS, dtype=np.int32)
+    """Examples that are blended; those of weight 0 mean nothing. (character, 2, 24)"""
+    reach_example_weight: FloatArray = _array(2, SLOTS)
+    """Their weights, which follow those of the goal. (character, 2, 24)"""
+    reach_example_weight_rate: FloatArray = _array(2, SLOTS)
+    """1/s. (character, 2, 24)"""
 
     grab_stage: ByteArray = _array(2, dtype=np.uint8)
     """Stage of each hand, right and left: 0 open, 1 closing, 2 holding, 3 opening. (character, 2)"""

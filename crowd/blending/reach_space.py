@@ -16,8 +16,9 @@ from crowd.errors import MotionError, describe
 from crowd.motion.clip import Clip
 from crowd.motion.clip_table import rows, sample_keys
 from crowd.motion.rotation import multiply, rotate
-from crowd.motion.skeleton import Skeleton
+from crowd.motion.skeleton import Segment, Skeleton
 from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.reach_blend import LANES, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
 from crowd_kernels.reach_space import BLENDED, CHUNKS, MOST_SAMPLES, SCRATCH, ReachArrays, find_examples_crowd
 
 FloatArray = npt.NDArray[np.float64]
@@ -40,6 +41,10 @@ WIDEST_TURN = np.radians(75.0)
 """Examples farther apart than this about the body's axis are not blended, rad."""
 SEED = 5
 SIDES = ("right", "left")
+KEY_RATE = 60.0
+"""Keys per second; lower rates would show as jerks."""
+ARM_PARTS = ("clavicle", "upper_arm", "forearm", "hand")
+LEG_PARTS = ("thigh", "shank", "foot", "toe")
 
 
 @dataclass(frozen=True)
@@ -98,29 +103,14 @@ class ReachSpace:
     pseudo : tuple of PseudoExamples
     arrays : ReachArrays
         What the look-up kernel reads; examples are numbered over all sets.
-    key_rotation : (K, 256) float32
-        Key frames of all examples as pose rows, signs aligned over all keys.
-    key_pelvis : (K, 3) float32
-    first_key, key_count : (E,) int32
-    apex_key : (E,) float64
-        Place of the apex among the keys of an example.
-    apex_time, end_time : (E,) float64
-        s.
-    pelvis_rest : (S, 3) float64
-        Pelvis of each set at rest, m.
+    keys : ReachKeys
+        Key frames of all examples.
     """
 
     examples: tuple[ReachExamples, ...]
     pseudo: tuple[PseudoExamples, ...]
     arrays: ReachArrays
-    key_rotation: npt.NDArray[np.float32]
-    key_pelvis: npt.NDArray[np.float32]
-    first_key: IntArray
-    key_count: IntArray
-    apex_key: FloatArray
-    apex_time: FloatArray
-    end_time: FloatArray
-    pelvis_rest: FloatArray
+    keys: ReachKeys
 
     @classmethod
     def build(cls, skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> "ReachSpace":
@@ -137,42 +127,15 @@ class ReachSpace:
         MotionError
             A set has too few examples, or they all lie in one plane.
         """
-        clips = [clip for part in sets for clip in part]
-        sampled = [sample_keys(clip) for clip in clips]
-        count = np.array([len(rotation) for rotation, _ in sampled], np.int32)
-        first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
-        key_rotation = rows(np.concatenate([rotation for rotation, _ in sampled]))
-        key_pelvis = np.concatenate([pelvis for _, pelvis in sampled]).astype(np.float32)
-        labels = [clip.reach for clip in clips]
-        apex_time = np.array([label.apex for label in labels if label is not None])
-        end_time = np.array([clip.duration for clip in clips])
-        apex_key = apex_time / end_time * (count - 1)
+        keys = pack_keys(skeleton, sets)
         examples: list[ReachExamples] = []
         pseudo: list[PseudoExamples] = []
-        begin = 0
-        for part in sets:
-            members = np.arange(begin, begin + len(part))
-            examples.append(
-                apex_examples(skeleton, tuple(part), members, key_rotation, key_pelvis, first + apex_key)
-            )
+        starts = np.cumsum([0, *(len(part) for part in sets)])
+        for part, begin in zip(sets, starts[:-1], strict=True):
+            examples.append(apex_examples(skeleton, tuple(part), keys, np.arange(begin, begin + len(part))))
             image = mirrored(examples[-1], examples[-2], pseudo[-1]) if pseudo else None
             pseudo.append(image or fill(skeleton, examples[-1]))
-            begin += len(part)
-        starts = np.cumsum([0, *(len(part) for part in sets)])
-        rest = np.array([key_pelvis[first[start]] for start in starts[:-1]], np.float64)
-        return cls(
-            tuple(examples),
-            tuple(pseudo),
-            pack(pseudo, starts),
-            key_rotation,
-            np.ascontiguousarray(key_pelvis),
-            first,
-            count,
-            apex_key,
-            apex_time,
-            end_time,
-            rest,
-        )
+        return cls(tuple(examples), tuple(pseudo), pack(pseudo, starts), keys)
 
     def locate(self, part: npt.ArrayLike, position: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
         """Look up hand positions.
@@ -200,26 +163,74 @@ class ReachSpace:
         return clip, weight
 
 
+def group_of(name: str) -> int | None:
+    """Group of a joint that reaches write; None for eyes, fingers and others."""
+    for side, arm in (("right", RIGHT_ARM), ("left", LEFT_ARM)):
+        if name in {f"{side}_{part}" for part in ARM_PARTS}:
+            return arm
+    if name.startswith(("spine", "neck")) or name == "head":
+        return UPPER
+    return LOWER if name == "pelvis" or name.endswith(LEG_PARTS) else None
+
+
+def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
+    """Sample all examples and keep the joints that reaches write."""
+    groups = {joint: group_of(name) for joint, name in enumerate(skeleton.joint_names)}
+    joints = [joint for joint, group in groups.items() if group is not None]
+    clips = [clip for part in sets for clip in part]
+    sampled = [sample_keys(clip, KEY_RATE) for clip in clips]
+    count = np.array([len(rotation) for rotation, _ in sampled], np.int32)
+    first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
+    padded = rows(np.concatenate([rotation[:, joints] for rotation, _ in sampled]))
+    rotation = padded.reshape(-1, 4, PADDED_JOINTS)[:, :, :LANES].reshape(-1, ROW)
+    pelvis = np.concatenate([pelvis for _, pelvis in sampled]).astype(np.float32)
+    apex_time = np.array([clip.reach.apex for clip in clips if clip.reach is not None])
+    end_time = np.array([clip.duration for clip in clips])
+    starts = np.cumsum([0, *(len(part) for part in sets)])[:-1]
+    chains = np.array([arm_chain(skeleton, side) for side in SIDES])
+    return ReachKeys(
+        np.ascontiguousarray(rotation),
+        np.ascontiguousarray(pelvis),
+        first,
+        count,
+        apex_time / end_time * (count - 1),
+        apex_time,
+        end_time,
+        np.ascontiguousarray(pelvis[first[starts]], np.float64),
+        int(sum(len(part) for part in sets[: len(SIDES)])),
+        np.array(joints, np.int32),
+        np.array([groups[joint] for joint in joints], np.int32),
+        np.array([[joints.index(joint) for joint in chain] for chain in chains], np.int32),
+        np.ascontiguousarray(skeleton.offset[chains]),
+        np.ascontiguousarray(skeleton.segment[chains], np.int32),
+        int(Segment.LEG),
+        np.array([rest_position(skeleton, skeleton.joint(f"{side}_upper_arm")) for side in SIDES]),
+    )
+
+
+def rest_position(skeleton: Skeleton, joint: int) -> FloatArray:
+    """Place of a joint in the rest pose, m."""
+    place = np.zeros(3)
+    while joint >= 0:
+        place += skeleton.offset[joint]
+        joint = int(skeleton.parent[joint])
+    return place
+
+
 def apex_examples(
-    skeleton: Skeleton,
-    clips: tuple[Clip, ...],
-    members: npt.NDArray[np.integer],
-    key_rotation: npt.NDArray[np.float32],
-    key_pelvis: npt.NDArray[np.float32],
-    apex_row: FloatArray,
+    skeleton: Skeleton, clips: tuple[Clip, ...], keys: ReachKeys, members: npt.NDArray[np.integer]
 ) -> ReachExamples:
     """Poses of examples at their apex, interpolated between keys as the blend does, and where the hand is."""
-    place = apex_row[members]
+    place = (keys.first_key + keys.apex)[members]
     before = np.floor(place).astype(int)
-    after = np.minimum(before + 1, len(key_rotation) - 1)
+    after = np.minimum(before + 1, len(keys.rotation) - 1)
     share = (place - before)[:, None]
     label = clips[0].reach
-    side = label.side if label is not None else "right"
-    chain = arm_chain(skeleton, side)
-    row = (1.0 - share) * key_rotation[before] + share * key_rotation[after]
-    rotation = row.reshape(-1, 4, PADDED_JOINTS)[:, :, chain].transpose(0, 2, 1)
+    side = label.side if label is not None else SIDES[0]
+    row = (1.0 - share) * keys.rotation[before] + share * keys.rotation[after]
+    rotation = row.reshape(-1, 4, LANES)[:, :, keys.chain[SIDES.index(side)]].transpose(0, 2, 1)
     rotation = rotation / np.linalg.norm(rotation, axis=2, keepdims=True)
-    pelvis = (1.0 - share) * key_pelvis[before] + share * key_pelvis[after]
+    pelvis = (1.0 - share) * keys.pelvis[before] + share * keys.pelvis[after]
     position = hand_position(skeleton, side, rotation, pelvis)
     return ReachExamples(clips, side, position, rotation, pelvis)
 

@@ -1,17 +1,306 @@
 """Layer 5, reach: hands go to targets by blended examples, exact by inverse kinematics."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
 
 from crowd.blending.reach_space import SIDES, ReachSpace
+from crowd.controllers.controller import Step
 from crowd.motion.body import build_skeleton
+from crowd.motion.clip import Clip, ClipKind
+from crowd.motion.joint_tree import joint_tree
+from crowd.motion.library import MotionLibrary
+from crowd.motion.mirror import mirrored, opposite
 from crowd.motion.procedural.reaching import seated_reaches, standing_reaches
+from crowd.motion.skeleton import Segment, Skeleton
+from crowd.state import FloatArray, IntArray, State
+from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
+from crowd_kernels.reach import CHUNKS, reach_crowd
+from crowd_kernels.reach_blend import ROW, SLOTS
+from crowd_kernels.reach_goal import (
+    MOVE,
+    MOVING,
+    NONE,
+    REFUSED,
+    RETURN,
+    ReachLimits,
+    ReachState,
+    reach_status_crowd,
+)
+from crowd_kernels.reach_space import MOST_SAMPLES, SCRATCH
+
+REACH_LIMITS = ReachLimits(
+    least_time=0.25,
+    time_per_metre=0.57,
+    acceleration=12.0,
+    target_speed=2.5,
+    bulge=0.12,
+    clearance=0.30,
+    body_radius=0.10,
+    turn_back=5.0,
+    lead=0.8,
+    rotation_rate=3.0,
+    example_rate=22.0,
+)
+SOLVE = SETTINGS._replace(distance_tolerance=1e-4, angle_tolerance=2e-3, most_iterations=40)
+EFFECTORS = ("right_hand", "left_hand")
+FEWEST_EXAMPLES = 8
+"""A library with fewer reaches of a hand takes the built-in ones."""
+
+
+@dataclass(frozen=True)
+class ReachSettings:
+    """How people reach."""
+
+    limits: ReachLimits = REACH_LIMITS
+    """How hands go from target to target; larger accelerations follow moving targets more closely."""
+    solve: SolveSettings = SOLVE
+    """How inverse kinematics brings hands to their targets; tighter tolerances: smoother, slower."""
+    tolerance: float = 1e-3
+    """m. A hand at this distance has reached its target."""
+    angle_tolerance: float = 0.0174533
+    """rad. Likewise for its rotation."""
+
+
+class Reach:
+    """Moves hands to targets, holds them there and brings them back."""
+
+    state_fields: ClassVar[tuple[str, ...]] = tuple(f"reach_{name}" for name in ReachState._fields)
+
+    def __init__(
+        self,
+        library: MotionLibrary,
+        segment_scale: npt.NDArray[np.float32],
+        stature: FloatArray,
+        settings: ReachSettings | None = None,
+    ) -> None:
+        self.settings = settings or ReachSettings()
+        self._library = library
+        self._segment_scale = segment_scale
+        self._size = np.ascontiguousarray(stature / library.skeleton.stature)
+        self._space: ReachSpace | None = None
+        self._tree = joint_tree(library.skeleton, EFFECTORS)
+        capacity, size = len(stature), SCRATCH + MOST_SAMPLES
+        self._number = np.zeros((CHUNKS, size), np.int32)
+        self._real = np.zeros((CHUNKS, size + SLOTS))
+        self._rows = np.zeros((CHUNKS, 2 * ROW), np.float32)
+        length = scratch_length(len(self._tree.joint), len(EFFECTORS), len(Segment))
+        self._solve_scratch = np.zeros((CHUNKS, length), np.float32)
+        self._task = np.zeros((capacity, 2), np.uint8)
+        self._point = np.zeros((capacity, 2, 3), np.float32)
+        self._target = np.zeros((capacity, 2, 3), np.float32)
+        self._target_rotation = np.zeros((capacity, 2, 4), np.float32)
+        self._status = np.zeros((capacity, 2), np.uint8)
+        self._distance = np.zeros((capacity, 2), np.float32)
+        self._angle = np.zeros((capacity, 2), np.float32)
+        self._iterations = np.zeros(capacity, np.int32)
+
+    @property
+    def space(self) -> ReachSpace:
+        """The examples and what fills the space between them; made when somebody first reaches."""
+        if self._space is None:
+            self._space = reach_space(self._library)
+        return self._space
+
+    def activate(self, state: State, characters: IntArray) -> None:
+        """Start people with hanging arms."""
+        state.reach_stage[characters] = NONE
+        state.reach_status[characters] = NONE
+
+    def start(
+        self,
+        state: State,
+        characters: IntArray,
+        hand: npt.ArrayLike,
+        position_world: npt.ArrayLike,
+        rotation_world: npt.ArrayLike | None = None,
+        point_hand: npt.ArrayLike | None = None,
+        seconds: float | None = None,
+        hold: float | None = None,
+    ) -> None:
+        """Reach for targets; a hand that is on its way or holds goes there without returning.
+
+        Parameters
+        ----------
+        state : State
+        characters : (M,) int32
+        hand : int or (M,) int
+            0 right, 1 left.
+        position_world : (3,) or (M, 3) array
+            m.
+        rotation_world : (4,) or (M, 4) array, optional
+            Rotation of the hand joint.
+        point_hand : (3,) or (M, 3) array, optional
+            Point in the hand joint's frame that comes to the target, in the character's own size, m; the
+            wrist when left out.
+        seconds : float, optional
+            Time to the target, s; as people do when left out.
+        hold : float, optional
+            Time at the target before the hand returns, s; until `end` when left out.
+        """
+        hands = np.broadcast_to(np.asarray(hand), len(characters))
+        state.reach_target_world[characters, hands] = position_world
+        state.reach_has_rotation[characters, hands] = rotation_world is not None
+        if rotation_world is not None:
+            state.reach_target_rotation_world[characters, hands] = rotation_world
+        state.reach_point_hand[characters, hands] = 0.0 if point_hand is None else point_hand
+        state.reach_hold_left[characters, hands] = np.inf if hold is None else hold
+        state.reach_seconds[characters, hands] = 0.0 if seconds is None else seconds
+        place = state.reach_target_world[characters, hands]
+        is_finite = np.isfinite(place).all(axis=1)
+        is_new = state.reach_stage[characters, hands] == NONE
+        state.reach_status[characters, hands] = np.where(is_finite, MOVING, REFUSED)
+        going = ~is_new | is_finite
+        state.reach_stage[characters[going], hands[going]] = MOVE
+        rows, own = characters[is_new & is_finite], hands[is_new & is_finite]
+        for name in (
+            "offset",
+            "offset_velocity",
+            "offset_acceleration",
+            "turn_velocity",
+            "turn_acceleration",
+        ):
+            getattr(state, f"reach_{name}")[rows, own] = 0.0
+        for name in ("course", "course_rate", "time_left", "seen_velocity", "bulge"):
+            getattr(state, f"reach_{name}")[rows, own] = 0.0
+        state.reach_rotation_share[rows, own] = state.reach_has_rotation[rows, own]
+        away = state.reach_target_world[rows, own] - state.position_world[rows]
+        sine, cosine = np.sin(state.yaw[rows]), np.cos(state.yaw[rows])
+        state.reach_seen[rows, own, 0] = cosine * away[:, 0] - sine * away[:, 2]
+        state.reach_seen[rows, own, 1] = away[:, 1]
+        state.reach_seen[rows, own, 2] = sine * away[:, 0] + cosine * away[:, 2]
+        state.reach_rotation[rows, own] = (1.0, 0.0, 0.0, 0.0)
+        if rotation_world is not None:
+            turned = state.reach_target_rotation_world[rows, own]
+            w, x, y, z = turned.T
+            c, s = np.cos(0.5 * state.yaw[rows]), np.sin(-0.5 * state.yaw[rows])
+            state.reach_rotation[rows, own] = np.stack(
+                [c * w - s * y, c * x + s * z, c * y + s * w, c * z - s * x], axis=1
+            )
+
+    def move(
+        self,
+        state: State,
+        characters: IntArray,
+        hand: npt.ArrayLike,
+        position_world: npt.ArrayLike,
+        rotation_world: npt.ArrayLike | None = None,
+    ) -> None:
+        """Give hands that reach a new target; they go there without returning."""
+        hands = np.broadcast_to(np.asarray(hand), len(characters))
+        state.reach_target_world[characters, hands] = position_world
+        if rotation_world is not None:
+            state.reach_target_rotation_world[characters, hands] = rotation_world
+            state.reach_has_rotation[characters, hands] = True
+
+    def end(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> None:
+        """Let hands return."""
+        hands = np.broadcast_to(np.asarray(hand), len(characters))
+        reaches = state.reach_stage[characters, hands] != NONE
+        state.reach_stage[characters[reaches], hands[reaches]] = RETURN
+
+    def evaluate(self, step: Step) -> None:
+        """Advance reaches, blend the examples over the pose and bring the hands to their targets."""
+        state, settings = step.state, self.settings
+        stage = state.reach_stage[step.active]
+        reaching = step.active[(stage != NONE).any(axis=1)]
+        if reaching.size == 0:
+            return
+        parts = ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields))
+        reach_crowd(
+            self.space.arrays,
+            self.space.keys,
+            settings.limits,
+            self._segment_scale,
+            self._size,
+            state.position_world,
+            state.yaw,
+            state.is_seated,
+            state.locomotion_weight,
+            reaching,
+            step.dt,
+            parts,
+            self._number,
+            self._real,
+            self._rows,
+            state.pose_rotation,
+            state.pose_pelvis,
+            self._task,
+            self._target,
+            self._target_rotation,
+        )
+        np.copyto(self._point, state.reach_point_hand, casting="same_kind")
+        solve_crowd(
+            self._tree,
+            settings.solve,
+            self._segment_scale,
+            self._task,
+            self._point,
+            self._target,
+            self._target_rotation,
+            state.pose_rotation,
+            state.pose_pelvis,
+            reaching,
+            self._solve_scratch,
+            state.pose_rotation,
+            state.pose_pelvis,
+            self._status,
+            self._distance,
+            self._angle,
+            self._iterations,
+        )
+        self._report(state, reaching, step.dt, parts)
+
+    def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:
+        """Tell how the reaches stand."""
+        # Beyond the chain's length the distance is that to the nearest point that can be reached.
+        is_far = self._status[reaching] == 3
+        self._distance[reaching] = np.where(is_far, np.inf, self._distance[reaching])
+        reach_status_crowd(
+            self._distance,
+            self._angle,
+            reaching,
+            dt,
+            self.settings.tolerance,
+            self.settings.angle_tolerance,
+            parts,
+        )
+
+
+def reach_space(library: MotionLibrary) -> ReachSpace:
+    """Space of a library's reaches; what it lacks comes from the other hand or the built-in library."""
+    own = library.of_kind(ClipKind.REACH)
+    standing = one_for_each_side(library.skeleton, own)
+    if standing is None:
+        return built_in_reach_space()
+    seated = [[clip for clip in seated_reaches() if side_of(clip) == side] for side in SIDES]
+    return ReachSpace.build(library.skeleton, [*standing, *seated])
+
+
+def one_for_each_side(skeleton: Skeleton, clips: Sequence[Clip]) -> list[list[Clip]] | None:
+    """Reaches of the right and of the left hand, mirrored where a side lacks; None where both do."""
+    sides = [[clip for clip in clips if side_of(clip) == side] for side in SIDES]
+    if max(len(side) for side in sides) < FEWEST_EXAMPLES:
+        return None
+    for lacking, other in ((0, 1), (1, 0)):
+        if len(sides[lacking]) < FEWEST_EXAMPLES:
+            sides[lacking] = [mirrored(clip, skeleton, opposite(clip.name)) for clip in sides[other]]
+    return sides
+
+
+def side_of(clip: Clip) -> str:
+    """Hand that a clip reaches with."""
+    assert clip.reach is not None
+    return clip.reach.side
 
 
 @cache
 def built_in_reach_space() -> ReachSpace:
     """Space of the built-in reaches: standing right and left, seated right and left; made once."""
     parts = (standing_reaches(), seated_reaches())
-    sets = [
-        [clip for clip in part if clip.reach and clip.reach.side == side] for part in parts for side in SIDES
-    ]
+    sets = [[clip for clip in part if side_of(clip) == side] for part in parts for side in SIDES]
     return ReachSpace.build(build_skeleton(), sets)

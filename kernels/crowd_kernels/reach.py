@@ -1,0 +1,357 @@
+"""Reaching: poses of many characters, and the targets that inverse kinematics takes their hands to."""
+
+from typing import Any
+
+import numpy as np
+
+from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.layers import smootherstep
+from crowd_kernels.quaternion import (
+    Quaternion,
+    conjugate,
+    from_rotation_vector,
+    multiply,
+    rotate,
+    rotation_vector,
+    slerp,
+)
+from crowd_kernels.reach_blend import (
+    LANES,
+    ROW,
+    ReachKeys,
+    blend_body,
+    choose_examples,
+    place_hand,
+    sum_examples,
+    unit_row,
+)
+from crowd_kernels.reach_goal import (
+    APEX,
+    END,
+    NONE,
+    RETURN,
+    ReachLimits,
+    ReachState,
+    course_shares,
+    goal_of,
+    quaternion_of,
+    track_target,
+    vector_of,
+)
+from crowd_kernels.reach_space import MOST_SAMPLES, SCRATCH, ReachArrays
+from crowd_kernels.vector import Vector, add, scaled, subtract
+
+CHUNKS = 32
+ZERO = np.float32(0.0)
+
+
+@kernel
+def aim_hand(
+    character: int,
+    arm: int,
+    other: float,
+    scale: Any,
+    live_pelvis: Vector,
+    live_rotation: Quaternion,
+    keys: ReachKeys,
+    limits: ReachLimits,
+    state: ReachState,
+    row: Any,
+    pose: Any,
+    pelvis: Any,
+    out_task: Any,
+    out_target: Any,
+    out_target_rotation: Any,
+) -> None:
+    """Set where inverse kinematics takes one hand: exactly to the goal at the apex.
+
+    The blended motion is moved by a growing share of what it will miss at its apex.
+
+    Parameters
+    ----------
+    other : float
+        Share of the other hand's examples.
+    scale : (G,) float32
+        Proportions.
+    live_pelvis, live_rotation : tuple of float
+        Pelvis of the pose below this layer, root frame, m.
+    row : (128,) float32
+        Scratch.
+    pose : (256,) float32
+        Pose row, blended.
+    pelvis : (3,) float32
+        Pelvis at leg scale 1, m.
+
+    Notes
+    -----
+    All other arguments are those of `choose_examples` and `reach_crowd`.
+
+    **Source:** Feng, Xu, Shapiro, section 5.2, the target that varies in time.
+    **Differs from the source:** the share rises along a minimum-jerk curve instead of evenly, so that the
+    hand neither starts nor stops abruptly.
+    """
+    leg = float(scale[keys.leg_segment])
+    course = state.course[character, arm]
+    side = course if course <= APEX else END - course
+    _, risen = course_shares(course, limits.lead)
+    body = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
+    rotation = (
+        float(pose[0]),
+        float(pose[PADDED_JOINTS]),
+        float(pose[2 * PADDED_JOINTS]),
+        float(pose[3 * PADDED_JOINTS]),
+    )
+    hand, turned = place_hand(keys, arm, scale, body, rotation, pose, PADDED_JOINTS)
+    point = vector_of(state.point_hand, character, arm)
+    goal = goal_of(state, character, arm)
+    here = add(hand, rotate(turned, point))
+    wanted = quaternion_of(state.rotation, character, arm)
+    target = goal
+    late = 1.0
+    asked = smootherstep(state.rotation_share[character, arm])
+    out_task[character, arm] = 1
+    if course != APEX:
+        row[:] = ZERO
+        moved, whole = sum_examples(character, arm, 0, APEX, keys, state, row)
+        _, upper = sum_examples(character, arm, 1, APEX, keys, state, row)
+        upper_share = upper / (whole + upper)
+        moved = scaled(moved, 1.0 / (whole + upper))
+        unit_row(row)
+        apex_body = add(scaled(moved, leg), scaled(live_pelvis, upper_share))
+        apex_rotation = slerp(
+            (float(row[0]), float(row[LANES]), float(row[2 * LANES]), float(row[3 * LANES])),
+            live_rotation,
+            upper_share,
+        )
+        apex, apex_turned = place_hand(keys, arm, scale, apex_body, apex_rotation, row, LANES)
+        miss = subtract(goal, add(apex, rotate(apex_turned, point)))
+        target = add(here, scaled(miss, risen))
+        # A trunk that is shared with the other hand does not do what was foreseen.
+        late = smootherstep(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * smootherstep(min(5.0 * other, 1.0))
+        target = add(target, scaled(subtract(goal, target), late))
+        turn = rotation_vector(multiply(wanted, conjugate(apex_turned)))
+        turned = multiply(from_rotation_vector(scaled(turn, risen * asked)), turned)
+    if asked > 0.0:
+        out_task[character, arm] = 3
+        turned = slerp(turned, wanted, late * asked)
+    for axis in range(3):
+        out_target[character, arm, axis] = target[axis]
+    for component in range(4):
+        out_target_rotation[character, arm, component] = turned[component]
+
+
+@kernel
+def reach_character(
+    character: int,
+    space: ReachArrays,
+    keys: ReachKeys,
+    limits: ReachLimits,
+    scale: Any,
+    size: float,
+    position_world: Vector,
+    yaw: float,
+    upper_share: float,
+    walking_share: float,
+    dt: float,
+    state: ReachState,
+    pose: Any,
+    pelvis: Any,
+    number: Any,
+    real: Any,
+    rows: Any,
+    out_task: Any,
+    out_target: Any,
+    out_target_rotation: Any,
+) -> None:
+    """Advance both hands of one character, blend its pose, and set the targets of inverse kinematics.
+
+    Parameters
+    ----------
+    character : int
+    scale : (G,) float32
+        Proportions.
+    size : float
+        Stature over the library's.
+    position_world : tuple of float
+        Root, m.
+    yaw : float
+        rad.
+    upper_share : float
+        0: the whole body reaches; 1: only the upper body, as of people who sit or walk.
+    walking_share : float
+        Share of locomotion in the pose.
+    pose : (256,) float32
+        In and out: pose row.
+    pelvis : (3,) float32
+        In and out: pelvis at leg scale 1, m.
+    number : (44,) int32
+        Scratch.
+    real : (68,) float64
+        Scratch.
+    rows : (256,) float32
+        Scratch.
+
+    Notes
+    -----
+    All other arguments are those of `reach_crowd`.
+    """
+    row = rows[:ROW]
+    total = rows[ROW:]
+    leg = float(scale[keys.leg_segment])
+    live_pelvis = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
+    live_rotation = (
+        float(pose[0]),
+        float(pose[PADDED_JOINTS]),
+        float(pose[2 * PADDED_JOINTS]),
+        float(pose[3 * PADDED_JOINTS]),
+    )
+    own = (0.0, 0.0)
+    for arm in range(2):
+        if state.stage[character, arm] == NONE:
+            continue
+        if state.stage[character, arm] != RETURN:
+            track_target(character, arm, position_world, yaw, live_pelvis, size, limits, dt, state)
+        choose_examples(
+            character,
+            arm,
+            live_pelvis,
+            size,
+            upper_share,
+            limits,
+            space,
+            keys,
+            dt,
+            state,
+            number,
+            real,
+            real[SCRATCH + MOST_SAMPLES :],
+        )
+        if state.stage[character, arm] != NONE:
+            share, _ = course_shares(state.course[character, arm], limits.lead)
+            state.weight[character, arm] = share
+            own = (share, own[1]) if arm == 0 else (own[0], share)
+    blend_body(character, walking_share, keys, own, state, row, total, pose, pelvis)
+    for arm in range(2):
+        out_task[character, arm] = 0
+        if state.stage[character, arm] != NONE:
+            aim_hand(
+                character,
+                arm,
+                own[1 - arm],
+                scale,
+                live_pelvis,
+                live_rotation,
+                keys,
+                limits,
+                state,
+                row,
+                pose,
+                pelvis,
+                out_task,
+                out_target,
+                out_target_rotation,
+            )
+
+
+@parallel_kernel
+def reach_crowd(
+    space: ReachArrays,
+    keys: ReachKeys,
+    limits: ReachLimits,
+    segment_scale: Any,
+    size: Any,
+    position_world: Any,
+    yaw: Any,
+    is_seated: Any,
+    locomotion_weight: Any,
+    active: Any,
+    dt: float,
+    state: ReachState,
+    number: Any,
+    real: Any,
+    rows: Any,
+    pose_rotation: Any,
+    pose_pelvis: Any,
+    out_task: Any,
+    out_target: Any,
+    out_target_rotation: Any,
+) -> None:
+    """Advance the reaches of many characters, blend their poses, and set the targets of inverse kinematics.
+
+    Parameters
+    ----------
+    space : ReachArrays
+        Sets: standing right and left, seated right and left.
+    keys : ReachKeys
+    limits : ReachLimits
+    segment_scale : (N, G) float32
+        Proportions.
+    size : (N,) float64
+        Stature over that of the library's skeleton.
+    position_world : (N, 3) float64
+        Root, m.
+    yaw : (N,) float64
+        rad.
+    is_seated : (N,) bool
+        The character sits: only the upper body reaches.
+    locomotion_weight : (N,) float64
+        Share of locomotion in the pose: the more, the more only the upper body reaches.
+    active : (A,) int32
+        Characters of whom a hand reaches, each once.
+    dt : float
+        s.
+    state : ReachState
+        In and out.
+    number : (32, 44) int32
+        Scratch.
+    real : (32, 68) float64
+        Scratch.
+    rows : (32, 256) float32
+        Scratch.
+    pose_rotation : (N, 256) float32
+        In and out: pose rows.
+    pose_pelvis : (N, 3) float32
+        In and out: pelvis in the root frame at leg scale 1, m.
+    out_task : (N, 2) uint8
+        What inverse kinematics is asked: 0 nothing, 1 position, 3 position and rotation.
+    out_target : (N, 2, 3) float32
+        Places for the points of the hands, root frame, m.
+    out_target_rotation : (N, 2, 4) float32
+        Rotations of the hands, root frame.
+
+    Notes
+    -----
+    **Source:** Feng, Xu, Shapiro, section 5.1 and 5.2.
+    **Differs from the source:** the two sections of each example are stretched by themselves, so that apexes
+    coincide; from one target to another the parameter moves along a curved minimum-jerk way instead of a
+    linear interpolation of poses.
+    """
+    count = active.shape[0]
+    for k in prange(CHUNKS):
+        chunk = (k * 37) % CHUNKS
+        for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            character = active[index]
+            walking = min(max(locomotion_weight[character], 0.0), 1.0)
+            reach_character(
+                character,
+                space,
+                keys,
+                limits,
+                segment_scale[character],
+                size[character],
+                (position_world[character, 0], position_world[character, 1], position_world[character, 2]),
+                yaw[character],
+                1.0 if is_seated[character] else walking,
+                walking,
+                dt,
+                state,
+                pose_rotation[character],
+                pose_pelvis[character],
+                number[chunk],
+                real[chunk],
+                rows[chunk],
+                out_task,
+                out_target,
+                out_target_rotation,
+            )

@@ -1,0 +1,560 @@
+"""The pose of reaching people: examples of both hands, blended over the pose below.
+
+Both sections of all examples are stretched to the course of the reach, so that apexes coincide. Pose rows are
+compact here: 32 joints, of which the body uses the first ones; fingers are left to grasping.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd_kernels._jit import inlined_kernel, kernel
+from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.locomotion import ease
+from crowd_kernels.quaternion import Quaternion, multiply, normalized, rotate
+from crowd_kernels.reach_goal import (
+    APEX,
+    ReachLimits,
+    ReachState,
+    advance_course,
+    goal_of,
+    quaternion_of,
+    vector_of,
+)
+from crowd_kernels.reach_space import SCRATCH, ReachArrays, find_examples
+from crowd_kernels.vector import Vector, add, norm, scaled, subtract
+
+LANES = 32
+ROW = 4 * LANES
+"""Length of a compact pose row: components outermost, 32 joints each."""
+SLOTS = 24
+"""Most examples that are blended for one hand."""
+LEAST_WEIGHT = 1e-4
+"""Weights that fade end here."""
+CHAIN = 9
+"""Joints from pelvis to hand."""
+LOWER, UPPER, RIGHT_ARM, LEFT_ARM = 0, 1, 2, 3
+"""Groups of joints: pelvis and legs; spine, neck and head; arms."""
+ZERO = np.float32(0.0)
+ONE = np.float32(1.0)
+TINY = np.float32(1e-12)
+
+
+class ReachKeys(NamedTuple):
+    """Key frames of all examples and the joints that they hold."""
+
+    rotation: npt.NDArray[np.float32]
+    """(K, 128) Compact pose rows, signs aligned over all keys."""
+    pelvis: npt.NDArray[np.float32]
+    """(K, 3) Pelvis in the root frame, m."""
+    first_key: npt.NDArray[np.int32]
+    """(E,) First key of each example."""
+    key_count: npt.NDArray[np.int32]
+    """(E,) Keys of each example."""
+    apex: npt.NDArray[np.float64]
+    """(E,) Place of the apex among an example's keys."""
+    apex_time: npt.NDArray[np.float64]
+    """(E,) s."""
+    end_time: npt.NDArray[np.float64]
+    """(E,) s."""
+    pelvis_rest: npt.NDArray[np.float64]
+    """(S, 3) Pelvis of each set at rest, m. Sets: standing right and left, seated right and left."""
+    first_seated: int
+    """First example of the seated sets."""
+    joint: npt.NDArray[np.int32]
+    """(J,) Skeleton joint of each compact joint."""
+    group: npt.NDArray[np.int32]
+    """(J,) Group of each compact joint."""
+    chain: npt.NDArray[np.int32]
+    """(2, 9) Compact joints from pelvis to right and left hand."""
+    chain_offset: npt.NDArray[np.float64]
+    """(2, 9, 3) Their rest offsets in the parent's frame, m."""
+    chain_segment: npt.NDArray[np.int32]
+    """(2, 9) Columns of the proportions that stretch the offsets."""
+    leg_segment: int
+    """Column that stretches the pelvis position."""
+    shoulder: npt.NDArray[np.float64]
+    """(2, 3) Shoulders in the rest pose, m."""
+
+
+@inlined_kernel
+def wrist_of_goal(
+    keys: ReachKeys,
+    arm: int,
+    goal: Vector,
+    rotation: Quaternion,
+    has_rotation: bool,
+    point: Vector,
+    size: float,
+) -> Vector:
+    """Estimate where the wrist is when a point of the hand is at its goal, root frame, m."""
+    length = norm(point)
+    if length == 0.0:
+        return goal
+    if has_rotation:
+        return subtract(goal, rotate(rotation, point))
+    shoulder = (size * keys.shoulder[arm, 0], size * keys.shoulder[arm, 1], size * keys.shoulder[arm, 2])
+    way = subtract(goal, shoulder)
+    distance = max(norm(way), 1e-6)
+    return subtract(goal, scaled(way, min(length / distance, 0.5)))
+
+
+@inlined_kernel
+def look_up(
+    part: int,
+    arm: int,
+    wrist: Vector,
+    pelvis: Vector,
+    size: float,
+    space: ReachArrays,
+    keys: ReachKeys,
+    number: Any,
+    real: Any,
+) -> int:
+    """Find the examples of a set for a wrist; those of seated people relative to the pelvis as it is.
+
+    Parameters
+    ----------
+    part : int
+        0 the whole body, 1 the upper body.
+    arm : int
+    wrist, pelvis : tuple of float
+        Root frame, m.
+    size : float
+        Stature over the library's.
+    space : ReachArrays
+    keys : ReachKeys
+    number : (44,) int32
+        Scratch; examples are written from 32 on.
+    real : (44,) float64
+        Scratch; weights likewise.
+
+    Returns
+    -------
+    int
+        Number of examples.
+    """
+    place = scaled(wrist, 1.0 / size)
+    if part == 1:
+        rest = (keys.pelvis_rest[2 + arm, 0], keys.pelvis_rest[2 + arm, 1], keys.pelvis_rest[2 + arm, 2])
+        place = add(scaled(subtract(wrist, pelvis), 1.0 / size), rest)
+    return find_examples(
+        space,
+        2 * part + arm,
+        place[0],
+        place[1],
+        place[2],
+        number[:SCRATCH],
+        real[:SCRATCH],
+        number[SCRATCH:],
+        real[SCRATCH:],
+    )
+
+
+@inlined_kernel
+def add_wanted(
+    clip: int, weight: float, character: int, arm: int, state: ReachState, out_wanted: Any
+) -> None:
+    """Add a weight that an example shall have to its slot, or to a free one; without any it is left out.
+
+    Parameters
+    ----------
+    clip : int
+    weight : float
+    character, arm : int
+    state : ReachState
+        In and out: `example`.
+    out_wanted : (24,) float64
+        In and out.
+    """
+    free = -1
+    for slot in range(SLOTS):
+        is_used = state.example_weight[character, arm, slot] != 0.0 or out_wanted[slot] != 0.0
+        if is_used and state.example[character, arm, slot] == clip:
+            out_wanted[slot] += weight
+            return
+        if not is_used and free < 0:
+            free = slot
+    if free >= 0:
+        state.example[character, arm, free] = clip
+        state.example_weight_rate[character, arm, free] = 0.0
+        out_wanted[free] = weight
+
+
+@kernel
+def choose_examples(
+    character: int,
+    arm: int,
+    pelvis: Vector,
+    size: float,
+    upper_share: float,
+    limits: ReachLimits,
+    space: ReachArrays,
+    keys: ReachKeys,
+    dt: float,
+    state: ReachState,
+    number: Any,
+    real: Any,
+    wanted: Any,
+) -> None:
+    """Let the weights of one hand's examples follow its goal, and advance its course at their pace.
+
+    The weights of a look-up have kinks as the goal moves; those of the blend follow them smoothly. At the
+    start of a reach they are taken over at once.
+
+    Parameters
+    ----------
+    upper_share : float
+        0: the whole body reaches; 1: only the upper body.
+    wanted : (24,) float64
+        Scratch.
+
+    Notes
+    -----
+    All other arguments are those of `look_up` and `reach_character`.
+    """
+    goal = goal_of(state, character, arm)
+    wrist = wrist_of_goal(
+        keys,
+        arm,
+        goal,
+        quaternion_of(state.rotation, character, arm),
+        state.rotation_share[character, arm] > 0.0,
+        vector_of(state.point_hand, character, arm),
+        size,
+    )
+    wanted[:] = 0.0
+    is_first = state.course[character, arm] <= 0.0
+    if is_first:
+        for slot in range(SLOTS):
+            state.example_weight[character, arm, slot] = 0.0
+    for part in range(2):
+        share = upper_share if part == 1 else 1.0 - upper_share
+        if share <= 0.0:
+            continue
+        found = look_up(part, arm, wrist, pelvis, size, space, keys, number, real)
+        for sample in range(SCRATCH, SCRATCH + found):
+            add_wanted(number[sample], share * real[sample], character, arm, state, wanted)
+    total = 0.0
+    there = 0.0
+    back = 0.0
+    for slot in range(SLOTS):
+        weight = wanted[slot]
+        if not is_first:
+            weight, rate = ease(
+                state.example_weight[character, arm, slot],
+                state.example_weight_rate[character, arm, slot],
+                wanted[slot],
+                limits.example_rate,
+                dt,
+            )
+            state.example_weight_rate[character, arm, slot] = rate
+            if wanted[slot] == 0.0 and weight < LEAST_WEIGHT:
+                weight = 0.0
+        weight = max(weight, 0.0)
+        state.example_weight[character, arm, slot] = weight
+        if weight > 0.0:
+            clip = state.example[character, arm, slot]
+            total += weight
+            there += weight * keys.apex_time[clip]
+            back += weight * (keys.end_time[clip] - keys.apex_time[clip])
+    # Long limbs move more slowly (dynamic similarity).
+    slowness = math.sqrt(size) / total
+    time = state.seconds[character, arm]
+    rate = 1.0 / (there * slowness) if time <= 0.0 else 1.0 / time
+    advance_course(character, arm, rate, rate * there / back, limits, dt, state)
+
+
+@inlined_kernel
+def blend_row(key: Any, next_key: Any, weight: Any, next_weight: Any, out_sum: Any) -> None:
+    """Add the weighted sum of two compact rows to a row.
+
+    Parameters
+    ----------
+    key, next_key : (128,) float32
+    weight, next_weight : float32
+    out_sum : (128,) float32
+        In and out.
+    """
+    for lane in range(ROW):
+        out_sum[lane] += weight * key[lane] + next_weight * next_key[lane]
+
+
+@inlined_kernel
+def unit_row(row: Any) -> None:
+    """Scale the quaternions of a compact row to unit length, in place.
+
+    Parameters
+    ----------
+    row : (128,) float32
+        In and out; quaternions without length become the identity.
+    """
+    for lane in range(LANES):
+        w = row[lane]
+        x = row[LANES + lane]
+        y = row[2 * LANES + lane]
+        z = row[3 * LANES + lane]
+        square = w * w + x * x + y * y + z * z
+        scale = ONE / np.sqrt(square)
+        is_lost = square < TINY
+        row[lane] = ONE if is_lost else w * scale
+        row[LANES + lane] = ZERO if is_lost else x * scale
+        row[2 * LANES + lane] = ZERO if is_lost else y * scale
+        row[3 * LANES + lane] = ZERO if is_lost else z * scale
+
+
+@inlined_kernel
+def sum_examples(
+    character: int, arm: int, part: int, course: float, keys: ReachKeys, state: ReachState, row: Any
+) -> tuple[Vector, float]:
+    """Add the weighted examples of one hand at a course to a compact row.
+
+    Parameters
+    ----------
+    character, arm : int
+    part : int
+        0 those of the whole body, 1 those of the upper body.
+    course : float
+    keys : ReachKeys
+    state : ReachState
+    row : (128,) float32
+        In and out.
+
+    Returns
+    -------
+    tuple of float, float
+        Weighted sum of the pelvis, m, and sum of the weights.
+    """
+    x = 0.0
+    y = 0.0
+    z = 0.0
+    total = 0.0
+    for slot in range(SLOTS):
+        own = state.example_weight[character, arm, slot]
+        clip = state.example[character, arm, slot]
+        if own <= 0.0 or (clip >= keys.first_seated) != (part == 1):
+            continue
+        apex = keys.apex[clip]
+        place = course * apex
+        if course > APEX:
+            place = apex + (course - APEX) * (keys.key_count[clip] - 1 - apex)
+        index = min(int(place), keys.key_count[clip] - 2)
+        before = keys.first_key[clip] + index
+        after_share = own * (place - index)
+        before_share = own - after_share
+        blend_row(
+            keys.rotation[before],
+            keys.rotation[before + 1],
+            np.float32(before_share),
+            np.float32(after_share),
+            row,
+        )
+        x += before_share * keys.pelvis[before, 0] + after_share * keys.pelvis[before + 1, 0]
+        y += before_share * keys.pelvis[before, 1] + after_share * keys.pelvis[before + 1, 1]
+        z += before_share * keys.pelvis[before, 2] + after_share * keys.pelvis[before + 1, 2]
+        total += own
+    return (x, y, z), total
+
+
+@inlined_kernel
+def weight_of_part(
+    character: int, arm: int, part: int, keys: ReachKeys, state: ReachState
+) -> tuple[float, float]:
+    """Find the summed weights of one hand's examples: those of a part, and all."""
+    own = 0.0
+    total = 0.0
+    for slot in range(SLOTS):
+        weight = state.example_weight[character, arm, slot]
+        total += weight
+        if (state.example[character, arm, slot] >= keys.first_seated) == (part == 1):
+            own += weight
+    return own, total
+
+
+@inlined_kernel
+def add_group_row(
+    keys: ReachKeys, row: Any, pose: Any, lower: float, upper: float, right: float, left: float, out_sum: Any
+) -> None:
+    """Add a compact row to a sum, signs as in a pose, with a share for each group of joints.
+
+    Parameters
+    ----------
+    keys : ReachKeys
+    row : (128,) float32
+        Unit quaternions.
+    pose : (256,) float32
+        Pose row.
+    lower, upper, right, left : float
+        Shares of the groups.
+    out_sum : (128,) float32
+        In and out.
+    """
+    for k in range(keys.joint.shape[0]):
+        group = keys.group[k]
+        arms = right if group == RIGHT_ARM else left
+        share = np.float32(lower if group == LOWER else (upper if group == UPPER else arms))
+        joint = keys.joint[k]
+        w, x, y, z = row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k]
+        cosine = (
+            w * pose[joint]
+            + x * pose[PADDED_JOINTS + joint]
+            + y * pose[2 * PADDED_JOINTS + joint]
+            + z * pose[3 * PADDED_JOINTS + joint]
+        )
+        share = -share if cosine < ZERO else share
+        out_sum[k] += share * w
+        out_sum[LANES + k] += share * x
+        out_sum[2 * LANES + k] += share * y
+        out_sum[3 * LANES + k] += share * z
+
+
+@inlined_kernel
+def write_pose(
+    keys: ReachKeys, total: Any, lower: float, upper: float, right: float, left: float, pose: Any
+) -> None:
+    """Write a sum of rows into a pose, completed by what the pose was.
+
+    Parameters
+    ----------
+    keys : ReachKeys
+    total : (128,) float32
+        Sum of rows times their shares.
+    lower, upper, right, left : float
+        Shares of the old pose in the groups; groups of share 1 keep their bits.
+    pose : (256,) float32
+        In and out: pose row.
+    """
+    for k in range(keys.joint.shape[0]):
+        group = keys.group[k]
+        arms = right if group == RIGHT_ARM else left
+        rest = np.float32(lower if group == LOWER else (upper if group == UPPER else arms))
+        if rest >= ONE:
+            continue
+        joint = keys.joint[k]
+        w = total[k] + rest * pose[joint]
+        x = total[LANES + k] + rest * pose[PADDED_JOINTS + joint]
+        y = total[2 * LANES + k] + rest * pose[2 * PADDED_JOINTS + joint]
+        z = total[3 * LANES + k] + rest * pose[3 * PADDED_JOINTS + joint]
+        scale = ONE / np.sqrt(w * w + x * x + y * y + z * z)
+        pose[joint] = w * scale
+        pose[PADDED_JOINTS + joint] = x * scale
+        pose[2 * PADDED_JOINTS + joint] = y * scale
+        pose[3 * PADDED_JOINTS + joint] = z * scale
+
+
+@kernel
+def blend_body(
+    character: int,
+    walking_share: float,
+    keys: ReachKeys,
+    own: tuple[float, float],
+    state: ReachState,
+    row: Any,
+    total: Any,
+    pose: Any,
+    pelvis: Any,
+) -> None:
+    """Blend the examples of both hands over the pose of one character.
+
+    Where both hands reach, trunk and legs are shared by their weights; each arm belongs to its own reach and
+    balances the other one's as far as it is free.
+
+    Parameters
+    ----------
+    own : tuple of float
+        Shares of the right and left hand's examples.
+    row, total : (128,) float32
+        Scratch.
+    pose : (256,) float32
+        In and out: pose row.
+    pelvis : (3,) float32
+        In and out: pelvis at leg scale 1, m.
+
+    Notes
+    -----
+    All other arguments are those of `reach_character`.
+    """
+    both = 1.0 - (1.0 - own[0]) * (1.0 - own[1])
+    total[:] = ZERO
+    x = 0.0
+    y = 0.0
+    z = 0.0
+    below = 0.0
+    for arm in range(2):
+        if own[arm] <= 0.0:
+            continue
+        trunk = both * own[arm] / (own[0] + own[1])
+        other = own[arm] * (1.0 - own[1 - arm]) * (1.0 - walking_share)
+        for part in range(2):
+            weight, whole = weight_of_part(character, arm, part, keys, state)
+            if weight <= 0.0:
+                continue
+            row[:] = ZERO
+            moved, _ = sum_examples(character, arm, part, state.course[character, arm], keys, state, row)
+            unit_row(row)
+            share = weight / whole
+            right = share * (own[arm] if arm == 0 else other)
+            left = share * (own[arm] if arm == 1 else other)
+            lower = share * trunk if part == 0 else 0.0
+            add_group_row(keys, row, pose, lower, share * trunk, right, left, total)
+            x += lower * moved[0] / weight
+            y += lower * moved[1] / weight
+            z += lower * moved[2] / weight
+            below += lower
+    still = 1.0 - walking_share
+    right = (1.0 - own[0]) - own[1] * (1.0 - own[0]) * still
+    left = (1.0 - own[1]) - own[0] * (1.0 - own[1]) * still
+    write_pose(keys, total, 1.0 - below, 1.0 - both, right, left, pose)
+    pelvis[0] = x + (1.0 - below) * pelvis[0]
+    pelvis[1] = y + (1.0 - below) * pelvis[1]
+    pelvis[2] = z + (1.0 - below) * pelvis[2]
+
+
+@inlined_kernel
+def place_hand(
+    keys: ReachKeys, arm: int, scale: Any, pelvis: Vector, pelvis_rotation: Quaternion, row: Any, stride: int
+) -> tuple[Vector, Quaternion]:
+    """Walk from the pelvis to a hand.
+
+    Parameters
+    ----------
+    keys : ReachKeys
+    arm : int
+    scale : (G,) float32
+        Proportions.
+    pelvis : tuple of float
+        Root frame, in the character's own size, m.
+    pelvis_rotation : tuple of float
+        Root frame.
+    row : (4 * stride,) float32
+        Local rotations: a compact row (stride 32) or a pose row (stride 64).
+    stride : int
+
+    Returns
+    -------
+    tuple of float, tuple of float
+        Position, m, and rotation of the hand, root frame.
+    """
+    place = pelvis
+    turned = pelvis_rotation
+    for k in range(1, CHAIN):
+        size = float(scale[keys.chain_segment[arm, k]])
+        offset = (
+            size * keys.chain_offset[arm, k, 0],
+            size * keys.chain_offset[arm, k, 1],
+            size * keys.chain_offset[arm, k, 2],
+        )
+        place = add(place, rotate(turned, offset))
+        joint = keys.chain[arm, k]
+        if stride == PADDED_JOINTS:
+            joint = keys.joint[joint]
+        local = (
+            float(row[joint]),
+            float(row[stride + joint]),
+            float(row[2 * stride + joint]),
+            float(row[3 * stride + joint]),
+        )
+        turned = multiply(turned, local)
+    return place, normalized(turned)

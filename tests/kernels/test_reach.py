@@ -1,0 +1,141 @@
+"""Kernels of reaching against slow twins, and what holds for any target."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crowd.bench.reach import Reachers
+from crowd.controllers.reach import REACH_LIMITS
+from crowd_kernels.reach import reach_crowd
+from crowd_kernels.reach_goal import (
+    HOLD,
+    MOVE,
+    OUT_OF_REACH,
+    REACHED,
+    REFUSED,
+    RETURN,
+    ReachState,
+    hump,
+    is_inside_body,
+    reach_status_crowd,
+    settle,
+)
+from tests.oracles import reach as oracle
+from tests.oracles import reach_space as space_oracle
+
+number = st.floats(-3, 3)
+
+
+@given(place=number, velocity=number, acceleration=number, time=st.floats(0.05, 2), dt=st.floats(0.001, 0.05))
+def test_settle_matches_oracle(place, velocity, acceleration, time, dt):
+    found = settle(place, velocity, acceleration, time, dt)
+    wanted = oracle.settle(place, velocity, acceleration, time, dt)
+    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6 * (1 + 10 / time**2))
+
+
+@given(place=number, velocity=number, acceleration=number, steps=st.integers(5, 90))
+def test_settling_step_by_step_comes_to_rest_in_time(place, velocity, acceleration, steps):
+    dt = 1 / 60
+    motion = (place, velocity, acceleration)
+    for step in range(steps):
+        motion = settle(*motion, (steps - step) * dt, dt)
+    assert motion == (0.0, 0.0, 0.0)
+
+
+def test_hump_rises_to_one_and_is_smooth_at_its_ends():
+    assert hump(0.5)[0] == pytest.approx(1.0)
+    assert hump(0.0) == (0.0, 0.0, 0.0)
+    progress = np.linspace(0.01, 0.99, 50)
+    slope = [(hump(q + 1e-6)[0] - hump(q - 1e-6)[0]) / 2e-6 for q in progress]
+    bend = [(hump(q + 1e-5)[1] - hump(q - 1e-5)[1]) / 2e-5 for q in progress]
+    np.testing.assert_allclose([hump(q)[1] for q in progress], slope, atol=1e-6)
+    np.testing.assert_allclose([hump(q)[2] for q in progress], bend, atol=1e-4)
+
+
+def test_the_own_body_is_trunk_and_head():
+    pelvis = (0.0, 0.97, 0.0)
+    for inside in ((0.0, 1.2, 0.0), (0.05, 1.0, 0.05), (0.0, 1.6, 0.05)):
+        assert is_inside_body(inside, pelvis, 1.0, 0.1)
+    for outside in ((0.3, 1.2, 0.0), (0.0, 1.2, 0.2), (0.0, 0.4, 0.0), (0.0, 2.0, 0.0)):
+        assert not is_inside_body(outside, pelvis, 1.0, 0.1)
+
+
+@pytest.fixture(scope="module")
+def reachers():
+    return Reachers(24, seed=3)
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+@pytest.mark.parametrize("course", [0.15, 0.6, 1.0, 1.4])
+def test_reach_matches_oracle(reachers, hand, course, rng):
+    simulation, space = reachers.simulation, reachers.space
+    state, keys, reach = simulation.state, space.keys, simulation.reach
+    point = space.pseudo[hand].point
+    target = (point[rng.integers(0, len(point), 24)] + rng.normal(0, 0.02, (24, 3))) * reachers.size[:, None]
+    state.reach_stage[:] = 0
+    reachers.reach(hand, target)
+    # The first step takes the weights over, then the reach is set to its course.
+    reachers.step()
+    state.reach_course[:, hand] = course
+    state.reach_course_rate[:, hand] = 0.0
+    if course > 1:
+        state.reach_stage[:, hand] = RETURN
+    live = state.pose_rotation.copy().reshape(24, 4, 64)[:, :, keys.joint].transpose(0, 2, 1).astype(float)
+    live = np.tile([1.0, 0.0, 0.0, 0.0], (24, len(keys.joint), 1)) + 0.1 * rng.normal(size=live.shape)
+    live /= np.linalg.norm(live, axis=2, keepdims=True)
+    rows = np.zeros((24, 4, 64), np.float32)
+    rows[:, 0] = 1
+    rows[:, :, keys.joint] = live.transpose(0, 2, 1)
+    live_pelvis = np.tile([0.01, 0.95, -0.02], (24, 1)) + 0.01 * rng.normal(size=(24, 3))
+    pose, pelvis = rows.reshape(24, 256).copy(), live_pelvis.astype(np.float32)
+    task, out = np.zeros((24, 2), np.uint8), np.zeros((24, 2, 3), np.float32)
+    reach_crowd(
+        space.arrays, keys, REACH_LIMITS, simulation.model.people.segment_scale, reachers.size,
+        state.position_world, state.yaw, state.is_seated, np.zeros(24), reachers.rows, 1e-5,
+        ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields)),
+        reach._number, reach._real, reach._rows, pose, pelvis, task, out, np.zeros((24, 2, 4), np.float32),
+    )  # fmt: skip
+    first = [0, len(space.examples[0].clips)][hand]
+    for row in range(24):
+        weights = space_oracle.find_examples(
+            point,
+            space.pseudo[hand].clip + first,
+            space.pseudo[hand].weight,
+            target[row] / reachers.size[row],
+        )
+        wanted = oracle.reach(
+            keys, weights, hand, course, REACH_LIMITS.lead, target[row],
+            simulation.model.people.segment_scale[row].astype(float), live[row], live_pelvis[row],
+        )  # fmt: skip
+        found = pose[row].reshape(4, 64)[:, keys.joint].T
+        sign = np.sign((found * wanted[0]).sum(axis=1, keepdims=True))
+        np.testing.assert_allclose(found * sign, wanted[0], atol=2e-5)
+        np.testing.assert_allclose(pelvis[row], wanted[1], atol=1e-5)
+        np.testing.assert_allclose(out[row, hand], wanted[2], atol=5e-5)
+        assert task[row].tolist() == [int(hand == 0), int(hand == 1)]
+
+
+def status_after(stage, status, distance, angle, has_rotation=False, hold=math.inf):
+    arrays = {name: np.zeros((1, 2)) for name in ReachState._fields}
+    arrays["stage"] = np.full((1, 2), stage, np.uint8)
+    arrays["status"] = np.full((1, 2), status, np.uint8)
+    arrays["has_rotation"] = np.full((1, 2), has_rotation)
+    arrays["hold_left"] = np.full((1, 2), hold)
+    state = ReachState(**arrays)
+    far, turned = np.full((1, 2), distance, np.float32), np.full((1, 2), angle, np.float32)
+    reach_status_crowd(far, turned, np.zeros(1, np.int32), 0.1, 1e-3, 0.0175, state)
+    return int(state.status[0, 0]), int(state.stage[0, 0])
+
+
+def test_status_tells_how_a_reach_stands():
+    assert status_after(MOVE, 1, 0.0, 0.0) == (1, MOVE)
+    assert status_after(HOLD, 1, 0.0005, 1.0) == (REACHED, HOLD)
+    assert status_after(HOLD, 1, 0.0005, 1.0, has_rotation=True) == (OUT_OF_REACH, HOLD)
+    assert status_after(HOLD, 1, 0.002, 0.0) == (OUT_OF_REACH, HOLD)
+    assert status_after(HOLD, 1, math.inf, 0.0) == (OUT_OF_REACH, HOLD)
+    assert status_after(HOLD, REFUSED, 0.0, 0.0) == (REFUSED, HOLD)
+    assert status_after(HOLD, 1, 0.0, 0.0, hold=0.05) == (REACHED, RETURN)
+    assert status_after(RETURN, REACHED, 0.5, 0.0) == (REACHED, RETURN)

@@ -1,0 +1,78 @@
+"""Slow twins of reaching: minimum-jerk motion by its equations, and the blended pose of one hand."""
+
+import numpy as np
+
+from crowd.motion.rotation import multiply, rotate
+
+
+def settle(place, velocity, acceleration, time, dt):
+    """The quintic with given start and an end at rest at 0, from the six conditions it fulfils."""
+    if time <= dt:
+        return 0.0, 0.0, 0.0
+    rows, wanted = [], [place, velocity, acceleration, 0.0, 0.0, 0.0]
+    for t in (0.0, time):
+        for order in range(3):
+            rows.append(
+                [
+                    np.prod(range(p - order + 1, p + 1)) * t ** max(p - order, 0) if p >= order else 0.0
+                    for p in range(6)
+                ]
+            )
+    curve = np.polynomial.Polynomial(np.linalg.solve(np.array(rows, float), wanted))
+    return curve(dt), curve.deriv()(dt), curve.deriv(2)(dt)
+
+
+def smootherstep(u):
+    u = np.clip(u, 0.0, 1.0)
+    return u**3 * (u * (6 * u - 15) + 10)
+
+
+def blend(keys, weights, course):
+    """Rotations (J, 4) and pelvis (3,) of examples, {number: weight}, at a course."""
+    rotation, pelvis = np.zeros((4, 32)), np.zeros(3)
+    for clip, weight in weights.items():
+        last = keys.key_count[clip] - 1
+        place = (
+            course * keys.apex[clip]
+            if course <= 1
+            else keys.apex[clip] + (course - 1) * (last - keys.apex[clip])
+        )
+        before = min(int(place), last - 1)
+        share = place - before
+        for key, own in ((before, 1 - share), (before + 1, share)):
+            row = keys.first_key[clip] + key
+            rotation += weight * own * keys.rotation[row].astype(float).reshape(4, 32)
+            pelvis += weight * own * keys.pelvis[row]
+    rotation = rotation.T[: len(keys.joint)]
+    return rotation / np.linalg.norm(rotation, axis=1, keepdims=True), pelvis
+
+
+def mix(first, second, share):
+    """Mix rotations (J, 4) the short way, with shares (J, 1) of the second."""
+    sign = np.where((first * second).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    mixed = (1 - share) * first + share * sign * second
+    return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+
+
+def place_hand(keys, arm, scale, pelvis, rotation):
+    """Hand of a pose: position and rotation, root frame."""
+    place, turned = np.asarray(pelvis, float), rotation[keys.chain[arm, 0]]
+    for k in range(1, 9):
+        place = place + rotate(turned, scale[keys.chain_segment[arm, k]] * keys.chain_offset[arm, k])
+        turned = multiply(turned, rotation[keys.chain[arm, k]])
+    return place, turned
+
+
+def reach(keys, weights, arm, course, lead, goal, scale, live, live_pelvis):
+    """Pose, pelvis at leg scale 1 and hand target of one standing person who reaches with one hand."""
+    side = course if course <= 1 else 2 - course
+    share = smootherstep(side / lead)
+    example, example_pelvis = blend(keys, weights, course)
+    pose = mix(live, example, np.full((len(live), 1), share))
+    pelvis = (1 - share) * live_pelvis + share * example_pelvis
+    leg = scale[keys.leg_segment]
+    here, _ = place_hand(keys, arm, scale, leg * pelvis, pose)
+    apex, apex_pelvis = blend(keys, weights, 1.0)
+    there, _ = place_hand(keys, arm, scale, leg * apex_pelvis, apex)
+    target = goal if course == 1 else here + smootherstep(side) * (goal - there)
+    return pose, pelvis, target
