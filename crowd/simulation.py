@@ -117,7 +117,7 @@ class Simulation:
         people = self.model.people
         self.reach = Reach(self.model.library, people.segment_scale, people.stature)
         self.joints = Joints(self.model.skeleton, capacity)
-        self.grab = Grab(self.model, self.objects, self.joints)
+        self.grab = Grab(self.model, self.objects, self.joints, self.reach)
         self.carrying = Carrying(self.model, self.grab)
         self.gaze = Gaze(
             self.model.skeleton, capacity, self.navigator.avoidance, self.objects, self.model.placed

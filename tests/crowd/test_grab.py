@@ -182,6 +182,7 @@ def relative_hand(simulation: Simulation, character: int, hand: int, item: int) 
 def test_what_another_holds_is_refused_unless_it_is_offered(run: Simulation) -> None:
     holding(run)
     state = run.state
+    state.reach_stage[:] = 0
     run.grab.grasp(state, rows(1), 0, BALL)
     assert state.grab_status[1, 0] == GrabStatus.TAKEN
     assert state.grab_object[1, 0] == -1
