@@ -3,7 +3,11 @@
 import time
 from collections.abc import Callable
 
+import numpy as np
+
+from crowd.controllers.grab import GrabSettings
 from crowd.motion.clip import ClipKind
+from crowd.scenario.object_table import ObjectTable
 from crowd.scenario.schema import Area, Character, Goal, Scenario, Wall, WorldTable
 from crowd.simulation import STAGES, Simulation
 
@@ -32,6 +36,9 @@ def warm_up(progress: Callable[[str], None] | None = None, *, is_threaded: bool 
         simulation.commands.play(2, gestures[0].name)
     simulation.commands.look_at(0, character=1)
     simulation.state.saccade_offset[2] = 0.01
+    # Hands need not arrive to close.
+    simulation.grab.settings = GrabSettings(near=10.0, near_angle=7.0)
+    simulation.grab.grasp(simulation.state, np.array([2], np.int32), 0, 0)
 
     def note(stage: str) -> None:
         if progress is not None:
@@ -43,7 +50,7 @@ def warm_up(progress: Callable[[str], None] | None = None, *, is_threaded: bool 
 
 
 def warm_up_scenario() -> Scenario:
-    """Two people who meet at a wall and one who stands: every kernel has something to do."""
+    """Two people who meet at a wall and one who stands and grasps: every kernel has something to do."""
     return Scenario(
         name="warm-up",
         world=WorldTable(
@@ -54,4 +61,5 @@ def warm_up_scenario() -> Scenario:
             Character(position=(-1.0, 2.0), facing=180.0, goals=(Goal(position=(-1.0, -2.0)),)),
             Character(position=(3.0, 0.0)),
         ),
+        objects=(ObjectTable(shape="sphere", radius=0.04, position=(3.0, 1.0, 0.4)),),
     )

@@ -15,7 +15,7 @@ from crowd.motion.hand import SIDES, hand_table
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
 from crowd.world.shape_table import shape_table
-from crowd_kernels.grasp import close_hands
+from crowd_kernels.grasp import close_hands, measure_gaps
 from crowd_kernels.hand_placement import TOO_BIG
 from crowd_kernels.hand_pose import compose_frames, hands_in_world, pose_hands
 
@@ -23,6 +23,8 @@ OPEN, CLOSING, HOLDING, OPENING = range(4)
 NOTHING, GRASP, TOUCH, GRASP_BOTH = range(4)
 REACH_NONE, REACH_MOVE, REACH_HOLD = range(3)
 REACH_OUT_OF_REACH, REACH_REFUSED = 3, 4
+FARTHEST_GAP = 0.05
+"""Gaps between fingers and objects are measured up to this, m."""
 
 Hands = tuple[IntArray, IntArray]
 """Characters and their hands, 0 right, 1 left; (A,) each."""
@@ -255,6 +257,42 @@ class Grab:
             np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4)).copy(),
         )
         return _composed(*outer, *back)
+
+    def finger_gaps(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> FloatArray:
+        """Measure how far fingers are from the objects that their hands go to or hold.
+
+        Parameters
+        ----------
+        state : State
+        characters : (M,) int32
+        hand : int or (M,) int
+
+        Returns
+        -------
+        (M, 5) float64
+            Least gap of each finger, thumb first, m; negative inside; at most 5 cm, also for empty hands.
+        """
+        rows, hands, _ = _listed(characters, hand, 0)
+        gap = np.full((rows.size, 5), FARTHEST_GAP)
+        has = np.flatnonzero(state.grab_object[rows, hands] >= 0)
+        at = rows[has], hands[has]
+        found = np.zeros((has.size, 5))
+        measure_gaps(
+            self.hand,
+            self.shapes,
+            at[1],
+            np.ascontiguousarray(state.grab_style[at]),
+            np.ascontiguousarray(state.grab_object[at]),
+            self._scale[at[0]],
+            *self._hands(state, at),
+            self.objects.position_world,
+            self.objects.rotation_world,
+            np.ascontiguousarray(state.finger_closure[at]),
+            FARTHEST_GAP,
+            found,
+        )
+        gap[has] = found
+        return gap
 
     # ---- in every step
 

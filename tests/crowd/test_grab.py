@@ -90,6 +90,7 @@ def test_a_hand_closes_holds_and_opens(run: Simulation) -> None:
     assert objects.holder[BALL] == 0
     assert objects.holder_hand[BALL].tolist() == [False, True]
     assert state.finger_contact[0, 1].sum() >= 3
+    assert -1e-4 < run.grab.finger_gaps(state, rows(0, 1), 1)[0].min() < 1e-3
     place = objects.position_world[BALL].copy()
     run.grab.release(state, rows(0), 1)
     assert objects.holder[BALL] == -1
