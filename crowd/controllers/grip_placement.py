@@ -10,7 +10,7 @@ from crowd.motion.skeleton import Segment
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState, ShapeKind
 from crowd_kernels.capsule import ShapeTable
-from crowd_kernels.grasp import HandTable
+from crowd_kernels.hand import HandTable
 from crowd_kernels.hand_placement import PALM_GAP, place_hands
 from crowd_kernels.hand_pose import hands_in_world
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from crowd.motion.body import FINGERS, HAND, STATURE
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, swing, to_vector
 from crowd.motion.skeleton import Skeleton
-from crowd_kernels.grasp import HandTable
+from crowd_kernels.hand import HandTable
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from typing import Any
 
 from crowd_kernels._jit import kernel, parallel_kernel, prange
 from crowd_kernels.capsule import BOX, CAPSULE, SPHERE, ShapeTable, nearest_on_mesh, triangle_corners
-from crowd_kernels.grasp import (
-    CHUNKS,
+from crowd_kernels.grasp import CHUNKS
+from crowd_kernels.hand import (
     LEFT,
     PINCH,
     POWER,

@@ -3,8 +3,8 @@
 from typing import Any
 
 from crowd_kernels._jit import parallel_kernel, prange
-from crowd_kernels.grasp import (
-    CHUNKS,
+from crowd_kernels.grasp import CHUNKS
+from crowd_kernels.hand import (
     FINGERS,
     SEGMENTS,
     HandTable,
