@@ -9,13 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from crowd.controllers.grab import GrabStatus
 from crowd.errors import SettingsError, describe
 from crowd.motion.clip import ClipKind
+from crowd.motion.rotation import about, conjugate, multiply, yaw_of
 
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
 HANDS = ("right", "left")
+HANDING_HEIGHT = 0.64
+"""Height at which people hand things over, over stature."""
 Characters = int | slice | Sequence[int] | npt.NDArray[np.integer]
 
 
@@ -268,6 +272,125 @@ class Commands:
         names = HANDS if hand is None else (hand,)
         for name in names:
             simulation.reach.end(simulation.state, rows, self._hand("end_reach", name))
+
+    def grasp(self, characters: Characters, item: int | str, hand: str | None = None) -> None:
+        """Let characters reach for an object, close a hand around it and hold it, until `let_go`.
+
+        What another character holds out can be taken, and so can what the other hand holds. How it goes shows
+        in ``state.grab_status``, see `crowd.controllers.grab.GrabStatus`.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+        item : int or str
+            Row or name of the object.
+        hand : {"right", "left", "both"}, optional
+            When left out the hand on the object's side, and both for what is too big for one.
+
+        Raises
+        ------
+        SettingsError
+            There is no such object or hand.
+        """
+        rows, index, simulation = self._rows(characters), self._item("grasp", item), self._simulation
+        state, grab = simulation.state, simulation.grab
+        if hand == "both":
+            grab.grasp_both(state, rows, index)
+            return
+        hands = self._hands("grasp", rows, hand, simulation.objects.position_world[index])
+        grab.grasp(state, rows, hands, index)
+        if hand is None:
+            too_big = state.grab_status[rows, hands] == GrabStatus.TOO_BIG
+            grab.grasp(state, rows[too_big], 1 - hands[too_big], index)
+
+    def touch(self, characters: Characters, item: int | str, hand: str | None = None) -> None:
+        """Let characters lay a hand on an object until `let_go`; arguments as in `grasp`."""
+        rows, index, simulation = self._rows(characters), self._item("touch", item), self._simulation
+        hands = self._hands("touch", rows, hand, simulation.objects.position_world[index])
+        simulation.grab.touch(simulation.state, rows, hands, index)
+
+    def put(
+        self,
+        characters: Characters,
+        position_world: npt.ArrayLike,
+        rotation_world: npt.ArrayLike | None = None,
+    ) -> None:
+        """Let characters bring what they hold to a place; `let_go` then leaves it there.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+            Those who hold nothing are left out.
+        position_world : (3,) or (M, 3) array
+            Centre of the object, m.
+        rotation_world : (4,) or (M, 4) array, optional
+            Its rotation (w, x, y, z); as it is now when left out.
+        """
+        rows, simulation = self._rows(characters), self._simulation
+        state, objects = simulation.state, simulation.objects
+        place = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))
+        for side in range(len(HANDS)):
+            items = np.maximum(state.grab_object[rows, side], 0)
+            turn = objects.rotation_world[items] if objects.count else np.zeros((rows.size, 4))
+            if rotation_world is not None:
+                turn = np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))
+            simulation.grab.put(state, rows, side, place, turn)
+
+    def let_go(
+        self,
+        characters: Characters,
+        hand: str | None = None,
+        position_world: npt.ArrayLike | None = None,
+        rotation_world: npt.ArrayLike | None = None,
+    ) -> None:
+        """Let characters open their hands and take them back; what they held stays where it is.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+        hand : {"right", "left"}, optional
+            Both when left out.
+        position_world, rotation_world : (3,) or (M, 3), and (4,) or (M, 4) array, optional
+            Where the object was to be put, m: taken over exactly where it is within a centimetre of it.
+        """
+        rows, simulation = self._rows(characters), self._simulation
+        for name in HANDS if hand is None else (hand,):
+            side = self._hand("let_go", name)
+            simulation.grab.release(simulation.state, rows, side, position_world, rotation_world)
+            simulation.reach.end(simulation.state, rows, side)
+
+    def hand_over(self, giver: int, taker: int) -> None:
+        """Let a character hold out what a hand of it holds, and another one, who stands before it, take it.
+
+        Raises
+        ------
+        SettingsError
+            The giver holds nothing.
+        """
+        simulation = self._simulation
+        state, objects = simulation.state, simulation.objects
+        held = np.flatnonzero(objects.holder == giver)
+        if held.size == 0:
+            raise SettingsError(describe("hand_over", "the giver holds nothing", giver))
+        item = int(held[0])
+        both = self._rows([giver, taker])
+        place = state.position_world[both].mean(axis=0)
+        place[1] = HANDING_HEIGHT * float(simulation.model.people.stature[both].mean())
+        side = int(np.argmax(objects.holder_hand[item]))
+        # Upright as it stood at the start, turned about the vertical as it is now.
+        start = simulation.model.objects.start_rotation_world[item]
+        heading = yaw_of(multiply(objects.rotation_world[item], conjugate(start)))
+        simulation.grab.put(state, both[:1], side, place, multiply(about(1, heading), start))
+        self.grasp(taker, item, HANDS[side])
+
+    def _item(self, what: str, item: int | str) -> int:
+        objects = self._simulation.model.objects
+        if isinstance(item, str):
+            return objects.index(item)
+        if not 0 <= item < objects.count:
+            allowed = f"0 to {objects.count - 1}" if objects.count else "the scenario has no objects"
+            raise SettingsError(describe(what, "no such object", item, allowed))
+        return item
 
     def _hands(
         self, what: str, rows: npt.NDArray[np.int32], hand: str | None, targets: npt.NDArray[np.float64]

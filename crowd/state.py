@@ -226,7 +226,7 @@ class State:
     grab_status: ByteArray = _array(2, dtype=np.uint8)
     """How the grasp stands, see `crowd.controllers.grab.GrabStatus`. (character, 2)"""
     grab_purpose: ByteArray = _array(2, dtype=np.uint8)
-    """What the hand is for: 0 nothing, 1 grasp, 2 touch, 3 grasp with both hands. (character, 2)"""
+    """What the hand is for: 0 nothing, 1 grasp, 2 touch, 3 grasp with both, 4 wait for it. (character, 2)"""
     grab_object: IntArray = _array(2, dtype=np.int32, fill=-1)
     """Object that the hand goes to or holds, -1 for none. (character, 2)"""
     grab_giver: IntArray = _array(2, dtype=np.int32, fill=-1)

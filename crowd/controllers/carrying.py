@@ -6,10 +6,11 @@ from typing import ClassVar
 import numpy as np
 
 from crowd.controllers.controller import Step
-from crowd.controllers.grab import HOLDING, REACH_HOLD, REACH_MOVE, Grab
+from crowd.controllers.grab import HOLDING, Grab
 from crowd.model import Model
 from crowd.motion.rotation import about, multiply, rotate
 from crowd.state import BoolArray, IntArray, State
+from crowd_kernels.reach_goal import HOLD, MOVE
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Carrying:
         held = (state.grab_stage[rows] == HOLDING).all(axis=1)
         rows, items = rows[held], items[held]
         moved = (state.reach_target_world[rows] != state.carry_target_world[rows]).any(axis=(1, 2))
-        is_reaching = np.isin(state.reach_stage[rows], (REACH_MOVE, REACH_HOLD)).all(axis=1)
+        is_reaching = np.isin(state.reach_stage[rows], (HOLD, MOVE)).all(axis=1)
         goes_on = state.is_carrying[rows] & ~moved & is_reaching
         state.is_carrying[step.active] = False
         begins = ~goes_on & ~is_reaching
@@ -97,9 +98,10 @@ class Carrying:
         position = state.position_world[rows] + rotate(heading, inner)
         rotation = multiply(heading, state.carry_rotation[rows])
         for hand in (0, 1):
-            place, wanted = self._grab.hand_targets(state, rows, hand, position, rotation)
+            hands = rows, np.full(rows.size, hand, np.int32)
+            place, wanted = self._grab.holding.hand_targets(hands, items, position, rotation)
             state.carry_target_world[rows, hand] = place
-            if begins.any() and self._grab.reach is not None:
+            if begins.any():
                 self._grab.reach.start(state, rows[begins], hand, place[begins], wanted[begins])
             state.reach_target_world[rows, hand] = place
             state.reach_target_rotation_world[rows, hand] = wanted

@@ -2,32 +2,30 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from crowd.controllers.controller import Step
 from crowd.controllers.grip_placement import GripPlacement
+from crowd.controllers.holding import Frames, Hands, Holding, composed
+from crowd.controllers.reach import Reach
 from crowd.joints import Joints
 from crowd.model import Model
-from crowd.motion.hand import SIDES, hand_table
+from crowd.motion.hand import hand_table
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
 from crowd.world.shape_table import shape_table
+from crowd_kernels import reach_goal
 from crowd_kernels.grasp import close_hands, measure_gaps
 from crowd_kernels.hand_placement import TOO_BIG
-from crowd_kernels.hand_pose import compose_frames, hands_in_world, pose_hands
+from crowd_kernels.hand_pose import pose_hands
 
 OPEN, CLOSING, HOLDING, OPENING = range(4)
-NOTHING, GRASP, TOUCH, GRASP_BOTH = range(4)
-REACH_NONE, REACH_MOVE, REACH_HOLD = range(3)
-REACH_OUT_OF_REACH, REACH_REFUSED = 3, 4
+NOTHING, GRASP, TOUCH, GRASP_BOTH, AWAIT = range(5)
 FARTHEST_GAP = 0.05
 """Gaps between fingers and objects are measured up to this, m."""
-
-Hands = tuple[IntArray, IntArray]
-"""Characters and their hands, 0 right, 1 left; (A,) each."""
 
 
 class GrabStatus(IntEnum):
@@ -47,6 +45,8 @@ class GrabStatus(IntEnum):
     """The fingers met nothing."""
     OUT_OF_REACH = 8
     """The hand is as near as it gets."""
+    GIVEN = 9
+    """Another hand has taken the object over; this one opens and returns."""
 
 
 @dataclass(frozen=True)
@@ -65,23 +65,6 @@ class GrabSettings:
     """rad. Likewise for its rotation."""
     settle_distance: float = 0.01
     """m. An object let go this near to where it was to be put is put exactly there."""
-
-
-class Reaches(Protocol):
-    """Whoever moves hands."""
-
-    def start(
-        self,
-        state: State,
-        characters: IntArray,
-        hand: npt.ArrayLike,
-        position_world: npt.ArrayLike,
-        rotation_world: npt.ArrayLike | None = None,
-    ) -> None:
-        """Let hand joints go to targets."""
-
-    def end(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> None:
-        """Let hands return."""
 
 
 class Grab:
@@ -108,19 +91,17 @@ class Grab:
         model: Model,
         objects: ObjectState,
         joints: Joints,
-        reach: Reaches | None = None,
+        reach: Reach,
         settings: GrabSettings | None = None,
     ) -> None:
         self.settings = settings or GrabSettings()
-        skeleton = model.skeleton
         self.objects = objects
+        self.holding = Holding(model.skeleton, objects, joints)
         self.reach = reach
-        self.hand = hand_table(skeleton)
+        self.hand = hand_table(model.skeleton)
         self.shapes = shape_table(model.objects)
         self.placement = GripPlacement(model, self.hand, self.shapes, objects, joints)
-        self._joints = joints
         self._scale = self.placement.scale
-        self._hand_joint = np.array([skeleton.joint(f"{side}_hand") for side in SIDES], np.int32)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people with empty hands."""
@@ -150,12 +131,11 @@ class Grab:
         rows, hands, items = rows[may], hands[may], items[may]
         other = 1 - hands
         together = (state.grab_object[rows, other] == items) & (state.grab_stage[rows, other] == OPEN)
-        alone = ~together
-        status = self._place(state, (rows[alone], hands[alone]), items[alone], GRASP)
-        small = status != TOO_BIG
-        self._send(state, (rows[alone][small], hands[alone][small]))
-        too_big = rows[alone][~small], hands[alone][~small]
-        state.grab_status[too_big] = GrabStatus.TOO_BIG
+        moves = ~together & self._is_brought(state, rows, items)
+        state.grab_object[rows[moves], hands[moves]] = items[moves]
+        state.grab_purpose[rows[moves], hands[moves]] = AWAIT
+        alone = ~together & ~moves
+        self._grasp_alone(state, (rows[alone], hands[alone]), items[alone])
         self._grasp_together(state, rows[together], items[together])
 
     def grasp_both(self, state: State, characters: IntArray, item: npt.ArrayLike) -> None:
@@ -194,22 +174,18 @@ class Grab:
         """
         rows, hands, _ = _listed(characters, hand, 0)
         items = state.grab_object[rows, hands]
-        has = (items >= 0) & (self.objects.holder[np.maximum(items, 0)] == rows)
-        has &= self.objects.holder_hand[np.maximum(items, 0), hands]
-        self.objects.holder_hand[items[has], hands[has]] = False
-        free = has & ~self.objects.holder_hand[np.maximum(items, 0)].any(axis=1)
-        self.objects.holder[items[free]] = -1
+        has = np.flatnonzero(self.holding.held_by((rows, hands), items))
+        is_free = self.holding.detach((rows[has], hands[has]), items[has])
         if position_world is not None:
-            places = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))
-            turns = (
-                self.objects.rotation_world[np.maximum(items, 0)]
-                if rotation_world is None
-                else np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))
-            )
-            away = np.linalg.norm(places - self.objects.position_world[np.maximum(items, 0)], axis=1)
-            put = free & (away <= self.settings.settle_distance)
-            self.objects.position_world[items[put]] = places[put]
-            self.objects.rotation_world[items[put]] = turns[put]
+            free = has[is_free]
+            objects, things = self.objects, items[free]
+            place = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))[free]
+            near = np.linalg.norm(place - objects.position_world[things], axis=1)
+            put = near <= self.settings.settle_distance
+            objects.position_world[things[put]] = place[put]
+            if rotation_world is not None:
+                turn = np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))[free]
+                objects.rotation_world[things[put]] = turn[put]
         self._open(state, (rows, hands))
 
     def put(
@@ -233,30 +209,12 @@ class Grab:
         rotation_world : (4,) or (M, 4) array
         """
         rows, hands, _ = _listed(characters, hand, 0)
-        place, turn = self.hand_targets(state, rows, hands, position_world, rotation_world)
         holds = state.grab_stage[rows, hands] == HOLDING
-        if self.reach is not None:
-            self.reach.start(state, rows[holds], hands[holds], place[holds], turn[holds])
-
-    def hand_targets(
-        self,
-        state: State,
-        characters: IntArray,
-        hand: npt.ArrayLike,
-        position_world: npt.ArrayLike,
-        rotation_world: npt.ArrayLike,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Find where hand joints must be for what they hold to come to poses: (M, 3) m and (M, 4)."""
-        rows, hands, _ = _listed(characters, hand, 0)
-        items = np.maximum(state.grab_object[rows, hands], 0)
-        none = np.zeros((rows.size, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (rows.size, 1))
-        grip = self.objects.grip_position[items, hands], self.objects.grip_rotation[items, hands]
-        back = _composed(*grip, *none, is_inverse=True)
-        outer = (
-            np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3)).copy(),
-            np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4)).copy(),
-        )
-        return _composed(*outer, *back)
+        place = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))[holds]
+        turn = np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))[holds]
+        at = rows[holds], hands[holds]
+        targets = self.holding.hand_targets(at, state.grab_object[at], place, turn)
+        self.reach.start(state, *at, *targets)
 
     def finger_gaps(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> FloatArray:
         """Measure how far fingers are from the objects that their hands go to or hold.
@@ -284,7 +242,7 @@ class Grab:
             np.ascontiguousarray(state.grab_style[at]),
             np.ascontiguousarray(state.grab_object[at]),
             self._scale[at[0]],
-            *self._hands(state, at),
+            *self.holding.hands_in_world(state, at),
             self.objects.position_world,
             self.objects.rotation_world,
             np.ascontiguousarray(state.finger_closure[at]),
@@ -327,15 +285,18 @@ class Grab:
     def settle(self, step: Step) -> None:
         """After the joints are known: hands that have arrived begin to close, held objects follow."""
         state = step.state
-        self._drop_of_the_gone(state)
+        self.holding.drop_of_the_gone(state)
         place, hands = np.nonzero(state.grab_object[step.active] >= 0)
         rows, hands = step.active[place], hands.astype(np.int32)
         waits = (state.grab_stage[rows, hands] == OPEN) & np.isin(
             state.grab_status[rows, hands], (GrabStatus.APPROACHING, GrabStatus.OUT_OF_REACH)
         )
         if waits.any():
+            awaits = waits & (state.grab_purpose[rows, hands] == AWAIT)
+            awaits[awaits] = ~self._is_brought(state, rows[awaits], state.grab_object[rows, hands][awaits])
+            self._grasp_alone(state, (rows[awaits], hands[awaits]), state.grab_object[rows, hands][awaits])
             self._arrive(state, (rows[waits], hands[waits]))
-        self._carry(state)
+        self.holding.follow(state)
         if waits.any():
             self._follow(state, (rows[waits], hands[waits]))
 
@@ -357,11 +318,24 @@ class Grab:
             return np.asarray(may)
         giver = objects.holder[known]
         is_others = may & (giver >= 0) & (giver != rows)
-        offers = ((state.reach_stage[giver] != REACH_NONE) & objects.holder_hand[known]).any(axis=1)
+        offers = ((state.reach_stage[giver] != reach_goal.NONE) & objects.holder_hand[known]).any(axis=1)
         taken = is_others & ~offers
         state.grab_status[rows[taken], side[taken]] = GrabStatus.TAKEN
         state.grab_giver[rows, side] = np.where(may, giver, -1)
         return np.asarray(may & ~taken)
+
+    def _is_brought(self, state: State, rows: IntArray, items: IntArray) -> BoolArray:
+        """Which objects others are still bringing to where they hold them out."""
+        holder = self.objects.holder[items]
+        moves = (state.reach_stage[holder] == reach_goal.MOVE) & self.objects.holder_hand[items]
+        return np.asarray((holder >= 0) & (holder != rows) & moves.any(axis=1))
+
+    def _grasp_alone(self, state: State, hands: Hands, items: IntArray) -> None:
+        """Choose grips of single hands and send those that are large enough."""
+        rows, side = hands
+        fits = self._place(state, hands, items, GRASP) != TOO_BIG
+        self._send(state, (rows[fits], side[fits]))
+        state.grab_status[rows[~fits], side[~fits]] = GrabStatus.TOO_BIG
 
     def _place(self, state: State, hands: Hands, items: IntArray, purpose: int) -> IntArray:
         """Choose grips for single hands; tells who is `TOO_BIG`."""
@@ -396,33 +370,13 @@ class Grab:
 
     def _send(self, state: State, hands: Hands) -> None:
         """Let the reach layer bring hands to their grips."""
-        if self.reach is not None and hands[0].size:
+        if hands[0].size:
             self.reach.start(state, *hands, *self._wanted(state, hands))
 
-    def _wanted(self, state: State, hands: Hands) -> tuple[FloatArray, FloatArray]:
+    def _wanted(self, state: State, hands: Hands) -> Frames:
         """Where hand joints shall be for their grips, in the world."""
-        items = state.grab_object[hands]
-        return _composed(
-            self.objects.position_world[items],
-            self.objects.rotation_world[items],
-            state.grab_position[hands],
-            state.grab_rotation[hands],
-        )
-
-    def _hands(self, state: State, hands: Hands) -> tuple[FloatArray, FloatArray]:
-        """Where hand joints are, in the world."""
-        position, rotation = np.zeros((hands[0].size, 3)), np.zeros((hands[0].size, 4))
-        hands_in_world(
-            self._hand_joint,
-            *hands,
-            self._joints.position_model,
-            self._joints.rotation_model,
-            state.position_world,
-            state.yaw,
-            position,
-            rotation,
-        )
-        return position, rotation
+        grip = state.grab_position[hands], state.grab_rotation[hands]
+        return composed(self.holding.in_world(state.grab_object[hands]), grip)
 
     def _arrive(self, state: State, hands: Hands) -> None:
         """Let hands that are at their grips touch or begin to close; give up what others have taken."""
@@ -432,10 +386,10 @@ class Grab:
         lost = (holder >= 0) & (holder != rows) & (holder != state.grab_giver[hands])
         lost &= state.grab_purpose[hands] != TOUCH
         self._give_up(state, (rows[lost], side[lost]), GrabStatus.TAKEN)
-        refused = ~lost & (state.reach_status[hands] == REACH_REFUSED)
+        refused = ~lost & (state.reach_status[hands] == reach_goal.REFUSED)
         self._give_up(state, (rows[refused], side[refused]), GrabStatus.REFUSED)
         stays = ~lost & ~refused
-        far = stays & (state.reach_status[hands] == REACH_OUT_OF_REACH)
+        far = stays & (state.reach_status[hands] == reach_goal.OUT_OF_REACH)
         state.grab_status[rows[stays], side[stays]] = np.where(
             far[stays], GrabStatus.OUT_OF_REACH, GrabStatus.APPROACHING
         )
@@ -457,7 +411,7 @@ class Grab:
 
     def _is_near(self, state: State, hands: Hands) -> BoolArray:
         """Who is at the grip, within `near` and `near_angle`."""
-        place, turn = self._hands(state, hands)
+        place, turn = self.holding.hands_in_world(state, hands)
         wanted_place, wanted_turn = self._wanted(state, hands)
         away = np.linalg.norm(place - wanted_place, axis=1)
         cosine = np.minimum(np.abs((turn * wanted_turn).sum(axis=1)), 1.0)
@@ -471,8 +425,7 @@ class Grab:
         if rows.size == 0:
             return
         items = state.grab_object[hands]
-        place, turn = self._hands(state, hands)
-        objects = self.objects
+        place, turn = self.holding.hands_in_world(state, hands)
         limit, contact = state.finger_limit, state.finger_contact
         limit[hands] = 0.0
         contact[hands] = 0
@@ -486,20 +439,16 @@ class Grab:
             self._scale[rows],
             place,
             turn,
-            objects.position_world,
-            objects.rotation_world,
+            self.objects.position_world,
+            self.objects.rotation_world,
             limit,
             contact,
         )
         met = contact[hands].any(axis=1) | (state.grab_purpose[hands] == GRASP_BOTH)
         self._give_up(state, (rows[~met], side[~met]), GrabStatus.MISSED)
         rows, side, items = rows[met], side[met], items[met]
-        there = objects.position_world[items], objects.rotation_world[items]
-        grip = _composed(place[met], turn[met], *there, is_inverse=True)
         self._take_from_others(state, rows, side, items)
-        objects.holder[items] = rows
-        objects.holder_hand[items, side] = True
-        objects.grip_position[items, side], objects.grip_rotation[items, side] = grip
+        self.holding.attach((rows, side), items, (place[met], turn[met]))
         state.grab_stage[rows, side] = CLOSING
         state.grab_time[rows, side] = 0.0
 
@@ -513,7 +462,7 @@ class Grab:
             held &= ~((holder == rows) & (state.grab_purpose[rows, side] == GRASP_BOTH))
             givers = holder[held]
             objects.holder_hand[items[held], hand] = False
-            self._open(state, (givers, np.full(givers.size, hand, np.int32)))
+            self._open(state, (givers, np.full(givers.size, hand, np.int32)), GrabStatus.GIVEN)
 
     def _close(self, state: State, hands: Hands, dt: float) -> None:
         """Go on closing."""
@@ -543,15 +492,17 @@ class Grab:
         done = left <= 0.0
         ready = hands[0][done], hands[1][done]
         state.finger_closure[ready] = 0.0
+        given = state.grab_status[ready] == GrabStatus.GIVEN
+        self.reach.end(state, ready[0][given], ready[1][given])
         self._forget(state, ready, GrabStatus.NONE)
 
-    def _open(self, state: State, hands: Hands) -> None:
+    def _open(self, state: State, hands: Hands, status: GrabStatus = GrabStatus.NONE) -> None:
         """Begin to open hands; those that have not closed yet are free at once."""
         rows, side = hands
         closed = np.isin(state.grab_stage[hands], (CLOSING, HOLDING))
         state.grab_time[rows[closed], side[closed]] = 0.0
         state.grab_stage[rows[closed], side[closed]] = OPENING
-        state.grab_status[rows[closed], side[closed]] = GrabStatus.NONE
+        state.grab_status[rows[closed], side[closed]] = status
         idle = state.grab_stage[hands] == OPEN
         self._forget(state, (rows[idle], side[idle]), GrabStatus.NONE)
 
@@ -560,8 +511,7 @@ class Grab:
         if hands[0].size == 0:
             return
         self._forget(state, hands, status)
-        if self.reach is not None:
-            self.reach.end(state, *hands)
+        self.reach.end(state, *hands)
 
     def _forget(self, state: State, hands: Hands, status: GrabStatus) -> None:
         state.grab_object[hands] = -1
@@ -571,41 +521,12 @@ class Grab:
         state.grab_status[hands] = status
         state.finger_contact[hands] = 0
 
-    def _drop_of_the_gone(self, state: State) -> None:
-        """Leave objects where they are whose holder has left the scene."""
-        objects = self.objects
-        gone = (objects.holder >= 0) & ~state.is_active[np.maximum(objects.holder, 0)]
-        objects.holder[gone] = -1
-        objects.holder_hand[gone] = False
-
-    def _carry(self, state: State) -> None:
-        """Let held objects follow; between two hands they take the middle of what both ask for."""
-        objects = self.objects
-        items, side = np.nonzero(objects.holder_hand)
-        if items.size == 0:
-            return
-        hands = objects.holder[items], side.astype(np.int32)
-        place, turn = _composed(
-            *self._hands(state, hands), objects.grip_position[items, side], objects.grip_rotation[items, side]
-        )
-        second = np.zeros(items.size, np.bool_)
-        second[1:] = items[1:] == items[:-1]
-        first = ~second
-        objects.position_world[items[first]] = place[first]
-        objects.rotation_world[items[first]] = turn[first]
-        both = np.flatnonzero(second)
-        if both.size:
-            sign = np.sign((turn[both] * turn[both - 1]).sum(axis=1, keepdims=True))
-            middle = turn[both] + sign * turn[both - 1]
-            objects.position_world[items[both]] = 0.5 * (place[both] + place[both - 1])
-            objects.rotation_world[items[both]] = middle / np.linalg.norm(middle, axis=1, keepdims=True)
-
     def _follow(self, state: State, hands: Hands) -> None:
         """Give hands that are on their way the places of objects that have moved."""
         still = state.grab_object[hands] >= 0
-        still &= state.grab_stage[hands] == OPEN
+        still &= (state.grab_stage[hands] == OPEN) & (state.grab_purpose[hands] != AWAIT)
         rows, side = hands[0][still], hands[1][still]
-        if self.reach is None or rows.size == 0:
+        if rows.size == 0:
             return
         state.reach_target_world[rows, side], state.reach_target_rotation_world[rows, side] = self._wanted(
             state, (rows, side)
@@ -625,16 +546,3 @@ def _listed(
 def _smooth(progress: FloatArray) -> FloatArray:
     """Rise from 0 to 1 with continuous second derivative (Perlin 2002)."""
     return np.asarray(progress**3 * (progress * (6.0 * progress - 15.0) + 10.0))
-
-
-def _composed(
-    position: FloatArray,
-    rotation: FloatArray,
-    inner_position: FloatArray,
-    inner_rotation: FloatArray,
-    is_inverse: bool = False,
-) -> tuple[FloatArray, FloatArray]:
-    """Chain frames, or with `is_inverse` express the second ones in the first ones."""
-    place, turn = np.zeros((len(position), 3)), np.zeros((len(position), 4))
-    compose_frames(position, rotation, inner_position, inner_rotation, is_inverse, place, turn)
-    return place, turn

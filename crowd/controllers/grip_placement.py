@@ -22,6 +22,8 @@ ROLL_TALL, ROLL_LOW = 0.30, 1.15
 """Turn of the back of the hand from the side upwards, rad."""
 DESCENT = 0.35
 """Share of the way down in the direction of the fingers; the hand stays flatter than the arm."""
+APART = 0.3
+"""How far the back of a hand leans away from the hand that holds the object already."""
 WIDEST = 0.9
 """Widest thing that two hands hold, m."""
 
@@ -171,12 +173,14 @@ class GripPlacement:
         return center - 0.08 * fingers, np.ascontiguousarray(rotation)
 
     def _away_from_holder(self, state: State, items: IntArray, back: FloatArray) -> FloatArray:
-        """Turn the back of the hand away from the hand that holds the object."""
+        """Turn the back of a hand away from the hand that holds the object, as little as both have room."""
         objects = self._objects
         hand = np.argmax(objects.holder_hand[items], axis=1).astype(np.int32)
         _, turn = self._joint_in_world(state, self._wrist, objects.holder[items], hand)
         its_back = rotate(turn, np.where(hand == 1, 1.0, -1.0)[:, None] * np.array([1.0, 0.0, 0.0]))
-        return -its_back
+        its_share = (back * its_back).sum(axis=1, keepdims=True)
+        turned = back - (np.maximum(its_share, 0.0) + np.where(its_share > 0.0, APART, 0.0)) * its_back
+        return np.asarray(turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9))
 
     def _joint_in_world(
         self, state: State, joint: IntArray, rows: IntArray, side: IntArray

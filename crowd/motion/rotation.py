@@ -44,6 +44,12 @@ def about(axis: int, angle: npt.ArrayLike) -> FloatArray:
     return rotation
 
 
+def yaw_of(rotation: FloatArray) -> FloatArray:
+    """Twist of rotations (..., 4) about +y, rad in (-pi, pi]."""
+    sign = np.where(rotation[..., 0] < 0.0, -1.0, 1.0)
+    return np.asarray(2.0 * np.arctan2(sign * rotation[..., 2], sign * rotation[..., 0]))
+
+
 def from_axes(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     """Rotation whose columns are three unit axes (F, 3)."""
     return np.asarray(Rotation.from_matrix(np.stack([x, y, z], axis=-1)).as_quat()[..., [3, 0, 1, 2]])

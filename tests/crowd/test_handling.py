@@ -1,0 +1,217 @@
+"""Picking up, carrying, putting down and handing over, with everything that moves a hand."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
+from crowd.errors import SettingsError
+from crowd.motion.rotation import conjugate, rotate
+from crowd.scenario.load import scenario_from
+from crowd.scenario.source import ScenarioSource
+from crowd.simulation import Simulation
+
+THINGS = [
+    {"name": "ball", "shape": "sphere", "radius": 0.04, "position": [-0.25, 1.0, 0.45]},
+    {"name": "bottle", "shape": "capsule", "radius": 0.035, "length": 0.24, "position": [2.8, 0.9, 0.45],
+     "resting": True},
+    {"name": "packet", "shape": "box", "size": [0.06, 0.05, 0.1], "position": [5.8, 0.9, 0.4],
+     "resting": True},
+    {"name": "pen", "shape": "capsule", "radius": 0.007, "length": 0.15, "position": [8.8, 1.0, 0.45],
+     "rotation": [90, 40, 0]},
+    {"name": "low", "shape": "sphere", "radius": 0.03, "position": [11.8, 0.35, 0.4]},
+    {"name": "high", "shape": "box", "size": [0.05, 0.12, 0.05], "position": [14.8, 1.6, 0.35]},
+]  # fmt: skip
+CARTON = {"name": "carton", "shape": "box", "size": [0.35, 0.25, 0.28], "position": [0, 0.85, 0.5],
+          "resting": True}  # fmt: skip
+BALLOON = {"name": "balloon", "shape": "sphere", "radius": 0.13, "position": [3, 1.1, 0.45]}
+CUP = {"name": "cup", "shape": "capsule", "radius": 0.035, "length": 0.14, "position": [-0.2, 1.0, 0.45]}
+
+
+def simulation_of(objects: Any, people: Any, dt: float = 1 / 60) -> Simulation:
+    scenario = scenario_from(
+        {
+            "dt": dt,
+            "world": {"bounds": {"x": [-10, 30], "z": [-20, 20]}},
+            "characters": [
+                {"position": [x, z], "facing": facing, "height": height, "glances": False}
+                for x, z, facing, height in people
+            ],
+            "objects": objects,
+        },
+        ScenarioSource(),
+    )
+    simulation = Simulation(scenario, threads=1)
+    advance(simulation, 0.3)
+    return simulation
+
+
+def advance(simulation: Simulation, seconds: float) -> None:
+    for _ in range(round(seconds / simulation.dt)):
+        simulation.step()
+
+
+def apart(simulation: Simulation, item: int) -> float:
+    """Greatest distance between an object and where the hands that hold it would have it, m."""
+    objects = simulation.objects
+    far = []
+    for side in np.flatnonzero(objects.holder_hand[item]):
+        row = int(objects.holder[item])
+        hands = np.array([row], np.int32), np.array([side], np.int32)
+        place, turn = simulation.grab.holding.hands_in_world(simulation.state, hands)
+        there = rotate(conjugate(turn), objects.position_world[item] - place)[0]
+        far.append(np.linalg.norm(there - objects.grip_position[item, side]))
+    return float(max(far))
+
+
+@pytest.fixture(scope="module")
+def pickers() -> Simulation:
+    """Six people, each with an object in its right hand."""
+    simulation = simulation_of(THINGS, [(3 * k, 0, 0, 1.6 + 0.05 * k) for k in range(6)])
+    for row in range(6):
+        simulation.commands.grasp(row, row, "right")
+    advance(simulation, 2.5)
+    return simulation
+
+
+def test_things_high_and_low_are_grasped(pickers: Simulation) -> None:
+    state, objects = pickers.state, pickers.objects
+    assert state.grab_stage[:, 0].tolist() == [HOLDING] * 6
+    assert state.grab_status[:, 0].tolist() == [GrabStatus.HOLDING] * 6
+    assert objects.holder.tolist() == list(range(6))
+    assert (state.finger_contact[:, 0].sum(axis=1) >= 3).all()
+    gaps = pickers.grab.finger_gaps(state, np.arange(6, dtype=np.int32), 0)
+    assert gaps.min() > -1e-3, "no finger is more than a millimetre inside"
+    away = objects.position_world - pickers.model.objects.start_position_world
+    assert np.linalg.norm(away, axis=1).max() < 0.003, "nothing moves while it is grasped"
+
+
+def test_things_are_carried_and_put_down_where_asked(pickers: Simulation) -> None:
+    state, objects = pickers.state, pickers.objects
+    rows = np.arange(6)
+    for name in ("right",):
+        pickers.commands.end_reach(rows, name)
+    worst = 0.0
+    pickers.commands.set_locomotion(rows, (1.2, 0.0, 0.0))
+    for _ in range(90):
+        pickers.step()
+        worst = max(worst, *(apart(pickers, item) for item in range(6)))
+    pickers.commands.set_locomotion(rows, (0.0, 0.0, 0.0))
+    advance(pickers, 1.5)
+    assert worst < 1e-3
+    ahead = np.array([-0.2, 0.0, 0.42])
+    wanted = state.position_world + ahead
+    wanted[:, 1] = [0.9, 1.0, 1.0, 1.1, 0.6, 1.3]
+    upright = pickers.model.objects.start_rotation_world
+    pickers.commands.put(rows, wanted, upright)
+    advance(pickers, 2.5)
+    off = np.linalg.norm(objects.position_world - wanted, axis=1)
+    assert off.max() < 0.01
+    pickers.commands.let_go(rows, "right", wanted, upright)
+    advance(pickers, 1.5)
+    assert np.allclose(objects.position_world, wanted, atol=1e-12), "exactly where asked"
+    assert (objects.holder == -1).all()
+    assert (state.grab_stage[:, 0] == OPEN).all()
+    assert (state.grab_weight[:, 0] == 0).all()
+
+
+@pytest.fixture(scope="module")
+def carriers() -> Simulation:
+    """Two people with something large between their hands."""
+    simulation = simulation_of([CARTON, BALLOON], [(0, 0, 0, 1.75), (3, 0, 0, 1.65)])
+    simulation.commands.grasp(0, "carton")
+    simulation.commands.grasp(1, "balloon")
+    advance(simulation, 2.5)
+    return simulation
+
+
+def test_large_things_are_carried_with_both_hands(carriers: Simulation) -> None:
+    state, objects = carriers.state, carriers.objects
+    assert (state.grab_stage == HOLDING).all()
+    assert objects.holder_hand.all()
+    carriers.commands.end_reach(slice(None))
+    advance(carriers, 1.5)
+    assert state.is_carrying.all()
+    carriers.commands.set_locomotion(slice(None), (1.2, 0.3, 0.0))
+    places = []
+    for _ in range(120):
+        carriers.step()
+        assert max(apart(carriers, item) for item in (0, 1)) < 1e-3
+        away = objects.position_world - state.position_world
+        sine, cosine = np.sin(state.yaw), np.cos(state.yaw)
+        x, z = cosine * away[:, 0] - sine * away[:, 2], sine * away[:, 0] + cosine * away[:, 2]
+        places.append(np.stack([x, away[:, 1], z], axis=1))
+    assert np.ptp(places, axis=0).max() < 0.02, "they stay where they are against the body"
+
+
+def test_a_large_thing_is_put_down_with_both_hands(carriers: Simulation) -> None:
+    state, objects = carriers.state, carriers.objects
+    carriers.commands.set_locomotion(slice(None), (0.0, 0.0, 0.0))
+    advance(carriers, 1.5)
+    heading = np.stack([np.sin(state.yaw), np.zeros(2), np.cos(state.yaw)], axis=1)
+    wanted = state.position_world + 0.45 * heading + np.array([0.0, 0.95, 0.0])
+    carriers.commands.put(slice(None), wanted)
+    advance(carriers, 2.0)
+    assert not state.is_carrying.any()
+    assert np.linalg.norm(objects.position_world - wanted, axis=1).max() < 0.01
+    carriers.commands.let_go(slice(None))
+    advance(carriers, 1.0)
+    assert (objects.holder == -1).all()
+    assert np.linalg.norm(objects.position_world - wanted, axis=1).max() < 0.01
+
+
+def test_from_person_to_person_and_from_hand_to_hand() -> None:
+    simulation = simulation_of([CUP], [(0, 0, 0, 1.75), (0, 1.0, 180, 1.7)])
+    state, objects = simulation.state, simulation.objects
+    with pytest.raises(SettingsError, match="holds nothing"):
+        simulation.commands.hand_over(0, 1)
+    simulation.commands.grasp(0, "cup", "right")
+    advance(simulation, 2.0)
+    assert state.grab_stage[0, 0] == HOLDING
+    simulation.commands.hand_over(0, 1)
+    advance(simulation, 3.5)
+    assert objects.holder[0] == 1
+    assert objects.holder_hand[0].tolist() == [True, False]
+    assert state.grab_stage[1, 0] == HOLDING
+    assert state.grab_stage[0, 0] == OPEN
+    assert state.reach_stage[0, 0] in (0, 3), "the giver takes the hand back"
+    assert simulation.grab.finger_gaps(state, np.array([1], np.int32), 0).min() > -1e-3
+    simulation.commands.put(1, [0.0, 1.1, 0.6], [1.0, 0, 0, 0])
+    advance(simulation, 2.0)
+    simulation.commands.grasp(1, "cup", "left")
+    advance(simulation, 3.0)
+    assert objects.holder[0] == 1
+    assert objects.holder_hand[0].tolist() == [False, True]
+    assert state.grab_stage[1].tolist() == [OPEN, HOLDING]
+
+
+def test_what_is_too_far_is_out_of_reach_and_moves_nothing() -> None:
+    far = {"name": "far", "shape": "sphere", "radius": 0.04, "position": [0, 1.0, 4.0]}
+    simulation = simulation_of([far], [(0, 0, 0, 1.75)])
+    simulation.commands.grasp(0, "far", "right")
+    advance(simulation, 2.0)
+    assert simulation.state.grab_status[0, 0] == GrabStatus.OUT_OF_REACH
+    assert simulation.state.grab_stage[0, 0] == OPEN
+    assert simulation.objects.holder[0] == -1
+    simulation.commands.let_go(0)
+    advance(simulation, 1.5)
+    assert simulation.state.grab_object[0, 0] == -1
+    assert np.isfinite(simulation.state.pose_rotation).all()
+
+
+def test_a_hand_follows_an_object_that_moves_and_gives_up_what_is_taken() -> None:
+    simulation = simulation_of([CUP], [(0, 0, 0, 1.75), (0, 1.0, 180, 1.7)])
+    state, objects = simulation.state, simulation.objects
+    simulation.commands.grasp(0, "cup", "right")
+    for _ in range(40):
+        objects.position_world[0] += [0.001, 0.002, 0.0]
+        simulation.step()
+    advance(simulation, 1.5)
+    assert state.grab_stage[0, 0] == HOLDING
+    simulation.commands.grasp(1, "cup", "right")
+    state.reach_stage[0, 0] = 0
+    simulation.commands.let_go(1)
+    state.reach_stage[0] = 0
+    simulation.commands.grasp(1, "cup", "right")
+    assert state.grab_status[1, 0] == GrabStatus.TAKEN
