@@ -16,6 +16,7 @@ from crowd.checkpoint import Stateful
 from crowd.commands import Commands
 from crowd.controllers.animation import Animation
 from crowd.controllers.carrying import Carrying
+from crowd.controllers.constraint import Constraint
 from crowd.controllers.controller import Controller, Step
 from crowd.controllers.foot_lock import FootLock
 from crowd.controllers.gaze import Gaze
@@ -133,6 +134,7 @@ class Simulation:
             self.gaze,
         )
         self.foot_lock = FootLock(self.model.skeleton, capacity=capacity, dt=self.dt)
+        self.constraint = Constraint(self.model.skeleton, capacity)
         self.commands = Commands(self)
         self.metrics = Metrics()
         self.stage_seconds = dict.fromkeys(STAGES, 0.0)
@@ -217,7 +219,7 @@ class Simulation:
             controller.evaluate(step)
 
     def _settle(self, step: Step, frame: Frame) -> None:
-        """Push bodies apart, plant feet, and compute joints."""
+        """Push bodies apart, plant feet, hold effectors, and compute joints."""
         self.navigator.project(step)
         if self.bodies == "discs":
             return
@@ -234,6 +236,7 @@ class Simulation:
             state.foot_point_world,
             state.foot_contact,
         )
+        self.constraint.evaluate(step)
         self.joints.compute(state, model.people, step.active)
         self.grab.settle(step)
 
@@ -282,6 +285,7 @@ class Simulation:
         for controller in self.controllers:
             controller.activate(self.state, rows)
         self.foot_lock.reset(rows)
+        self.constraint.activate(self.state, rows)
 
 
 def thread_count(wanted: int | None) -> int:

@@ -259,6 +259,29 @@ class State:
     carry_target_world: FloatArray = _array(2, 3)
     """Targets that carrying gave the hands last, m. (character, 2, 3)"""
 
+    constraint_task: ByteArray = _array(3, dtype=np.uint8)
+    """What is held of right hand, left hand and head: 0 nothing, 1 position, 2 rotation, 3 both.
+    (character, effector)"""
+    constraint_last_task: ByteArray = _array(3, dtype=np.uint8)
+    """The same while a hold fades: what was held last. (character, effector)"""
+    constraint_weight: Float32Array = _array(3, dtype=np.float32)
+    """Share of each hold in the pose, 0 to 1. (character, effector)"""
+    constraint_weight_rate: Float32Array = _array(3, dtype=np.float32)
+    """Rate of change of `constraint_weight`, 1/s. (character, effector)"""
+    constraint_target_world: FloatArray = _array(3, 3)
+    """Where effectors are held, m. (character, effector, 3)"""
+    constraint_target_rotation_world: Float32Array = _array(3, 4, dtype=np.float32)
+    """Rotations with which their joints are held. (character, effector, 4)"""
+    constraint_point: Float32Array = _array(3, 3, dtype=np.float32)
+    """What is held, in the frame of the joint, m. (character, effector, 3)"""
+    constraint_rotation: Float32Array = _array(4 * PADDED_JOINTS, dtype=np.float32)
+    """Pose that the constraint layer left in the last step, laid out as `pose_rotation`. (character, 256)"""
+    constraint_status: ByteArray = _array(3, dtype=np.uint8)
+    """0 nothing held, 1 on the way, 2 held within 1 mm and 1 degree, 3 out of reach, 4 refused.
+    (character, effector)"""
+    constraint_distance: Float32Array = _array(3, dtype=np.float32)
+    """Distance to where effectors are held, m. (character, effector)"""
+
     foot_contact: ByteArray = _array(2, dtype=np.uint8)
     """Contact of each foot: 0 swing, 1 heel, 2 ball. (character, 2)"""
     foot_point_world: FloatArray = _array(2, 2, 3)
