@@ -144,7 +144,8 @@ def hand_table(skeleton: Skeleton) -> HandTable:
             sweep[style, side] = to_vector(multiply(conjugate(opened[style, side]), closed))
     pinch = np.zeros((2, 3))
     table = HandTable(
-        joint, offset, tip, radius, opened, sweep, pinch,
+        joint, offset, tip, radius, opened, sweep,
+        length=np.linalg.norm(tip, axis=-1), angle=np.linalg.norm(sweep, axis=-1), pinch_point=pinch,
         palm_depth=PALM_DEPTH, palm_half_width=PALM_HALF_WIDTH,
         nearest_grip=0.045, farthest_grip=0.075, thumb_clearance=0.030,
         pinch_half=0.020, span_half=0.062,

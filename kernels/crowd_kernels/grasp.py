@@ -59,14 +59,14 @@ def survey_finger(
     horizon : float
         Largest step of interest.
     watched : int
-        Bits of the segments whose gap is asked for.
+        Bits of the segments that are looked at.
 
     Returns
     -------
     gap : float
         Least gap of a watched free segment, m; negative inside.
     inside : int
-        Bits of the free segments that are inside the object.
+        Bits of those that are inside the object.
     step : float
         No free segment gets deeper than `GRAZE` in a step of this size that ends outside.
 
@@ -84,13 +84,12 @@ def survey_finger(
         share = now if part >= locked else float(closure[segment])
         turned, start, tip = segment_end(hand, side, style, scale, segment, share, turned, end)
         end = start
-        if part < locked:
+        if part < locked or not watched & (1 << part):
             continue
         bound = scale * motion_bound(hand, side, style, finger, locked, part)
         radius = scale * hand.radius[segment]
         gap = segment_shape(start, tip, table, item, radius + bound * step) - radius
-        if watched & (1 << part):
-            least = min(least, gap)
+        least = min(least, gap)
         if gap < 0.0:
             inside |= 1 << part
         step = min(step, max(gap + 2.0 * GRAZE, GRAZE) / bound)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from crowd_kernels._jit import kernel
 from crowd_kernels.quaternion import Quaternion, conjugate, from_rotation_vector, multiply, rotate
-from crowd_kernels.vector import Vector, add, norm, subtract
+from crowd_kernels.vector import Vector, add, subtract
 
 FINGERS = 5
 SEGMENTS = 3
@@ -33,6 +33,10 @@ class HandTable(NamedTuple):
     """(S, 2, 15, 4) float64: local rotations of the open hand for each style of grip."""
     sweep: Any
     """(S, 2, 15, 3) float64: rotation vector from the open to the closed hand, applied first."""
+    length: Any
+    """(2, 15) float64: of the segments' axes."""
+    angle: Any
+    """(S, 2, 15) float64: size of `sweep`, rad."""
     pinch_point: Any
     """(2, 3) float64: where the tips meet in the frame of the hand."""
     palm_depth: float
@@ -123,10 +127,8 @@ def motion_bound(hand: HandTable, side: int, style: int, finger: int, locked: in
     reach = 0.0
     bound = 0.0
     for part in range(segment, locked - 1, -1):
-        tip = hand.tip[side, first + part]
-        reach += norm((tip[0], tip[1], tip[2]))
-        way = hand.sweep[style, side, first + part]
-        bound += reach * norm((way[0], way[1], way[2]))
+        reach += hand.length[side, first + part]
+        bound += reach * hand.angle[style, side, first + part]
     return bound
 
 
