@@ -1,5 +1,6 @@
 """``crowd bench``: the command line of the benchmarks."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -168,6 +169,49 @@ def sweep(
     for problem in problems:
         print(f"outside its bound: {problem}")
     return EXIT_FAILED if problems else 0
+
+
+@app.command()
+def reach(
+    targets: Annotated[int, typer.Option(min=1, help="Targets in reach of each hand.")] = 10_000,
+    far: Annotated[int, typer.Option(min=0, help="Targets out of reach of each hand.")] = 2_000,
+    seed: Annotated[int, typer.Option(help="Key of all random choices.")] = 0,
+) -> int:
+    """Reach for random targets: how many are met, how exactly, how smoothly, what is reported."""
+    from crowd.bench.reach import measure
+
+    table = Table(box=None, pad_edge=False)
+    for title in (
+        "targets of the",
+        "number",
+        "met",
+        "reported",
+        "mm",
+        "deg",
+        "rad/s2",
+        "times examples",
+        "rad/s",
+        "jitter mm",
+        "ok",
+    ):
+        table.add_column(title, justify="left" if title == "targets of the" else "right")
+    results = measure(targets, far, seed)
+    for row in results:
+        table.add_row(
+            row.name,
+            f"{row.targets:,}",
+            f"{row.reached:,}",
+            f"{row.reported:,}",
+            f"{1000.0 * row.error:.3f}",
+            f"{math.degrees(row.angle):.3f}",
+            f"{row.acceleration:.1f}",
+            f"{row.acceleration_ratio:.2f}",
+            f"{row.speed:.1f}",
+            f"{1000.0 * row.jitter:.4f}",
+            f"[red]{row.problem}[/]" if row.problem else "yes",
+        )
+    Console(width=130).print(table)
+    return 0 if all(not row.problem for row in results) else EXIT_FAILED
 
 
 @app.command()
