@@ -1,4 +1,4 @@
-"""Look-up of reach examples, with SciPy's k-d tree beside it."""
+"""Look-up of reach examples with SciPy's k-d tree beside it, and the reach layer with inverse kinematics."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,7 +8,9 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from benchmarks.case import Case
+from crowd.bench.reach import Reachers, random_targets
 from crowd.blending.reach_space import ReachSpace
+from crowd.controllers.controller import Step
 from crowd.controllers.reach import built_in_reach_space
 from crowd_kernels import _jit
 from crowd_kernels.reach_space import CHUNKS, MOST_SAMPLES, NEAREST, SCRATCH, find_examples_crowd
@@ -86,6 +88,38 @@ def check(hands: Hands) -> str | None:
     return None if worst < 1e-9 else f"weights differ by {worst:.2g}"
 
 
+def set_up_people(size: int, rng: np.random.Generator) -> tuple[Reachers, npt.NDArray[np.float64]]:
+    """Let everyone reach for a place with the right hand; they are half way."""
+    reachers = Reachers(size, seed=1)
+    reachers.simulation.threads = 1
+    _jit.set_thread_count(1)
+    target = random_targets(reachers, 0, rng, is_far=False)
+    reachers.step()
+    reachers.reach(0, target)
+    for _ in range(25):
+        reachers.step()
+    return reachers, target
+
+
+def evaluate(case: tuple[Reachers, npt.NDArray[np.float64]]) -> None:
+    """Advance the layer by one step."""
+    reachers, _ = case
+    simulation = reachers.simulation
+    _jit.set_thread_count(1)
+    step = Step(simulation.model, simulation.state, reachers.rows, 0, 0.0, simulation.dt, 0)
+    simulation.reach.evaluate(step)
+
+
+def check_people(case: tuple[Reachers, npt.NDArray[np.float64]]) -> str | None:
+    """After a while all hands are at their targets."""
+    reachers, target = case
+    for _ in range(90):
+        reachers.step()
+    worst = float(np.linalg.norm(reachers.hand(0)[0] - target, axis=1).max())
+    return None if worst < 1e-3 else f"a hand is {1000 * worst:.1f} mm off"
+
+
 CASES = [
-    Case("reach look-up", (1000, 10_000), set_up, run, check, peers={"scipy k-d tree": search}, bound_us=1.0)
+    Case("reach look-up", (1000, 10_000), set_up, run, check, peers={"scipy k-d tree": search}, bound_us=1.0),
+    Case("reach layer", (1000,), set_up_people, evaluate, check_people, bound_us=8.0),
 ]

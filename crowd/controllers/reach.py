@@ -44,9 +44,12 @@ REACH_LIMITS = ReachLimits(
     turn_back=5.0,
     lead=0.8,
     rotation_rate=3.0,
+    farthest=0.09,
     example_rate=22.0,
 )
-SOLVE = SETTINGS._replace(distance_tolerance=1e-4, angle_tolerance=2e-3, most_iterations=40)
+SOLVE = SETTINGS._replace(
+    reach=1e3, damping=0.03, distance_tolerance=1e-4, angle_tolerance=2e-3, most_iterations=40
+)
 EFFECTORS = ("right_hand", "left_hand")
 FEWEST_EXAMPLES = 8
 """A library with fewer reaches of a hand takes the built-in ones."""
@@ -257,10 +260,8 @@ class Reach:
 
     def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:
         """Tell how the reaches stand."""
-        # Beyond the chain's length the distance is that to the nearest point that can be reached.
-        is_far = self._status[reaching] == 3
-        self._distance[reaching] = np.where(is_far, np.inf, self._distance[reaching])
         reach_status_crowd(
+            self._target,
             self._distance,
             self._angle,
             reaching,

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.layers import smootherstep
 from crowd_kernels.quaternion import (
@@ -40,10 +40,16 @@ from crowd_kernels.reach_goal import (
     vector_of,
 )
 from crowd_kernels.reach_space import MOST_SAMPLES, SCRATCH, ReachArrays
-from crowd_kernels.vector import Vector, add, scaled, subtract
+from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 CHUNKS = 32
 ZERO = np.float32(0.0)
+
+
+@inlined_kernel
+def shortened(vector: Vector, longest: float) -> Vector:
+    """Shorten a vector to a length that it may have at most."""
+    return scaled(vector, min(longest / max(norm(vector), 1e-9), 1.0))
 
 
 @kernel
@@ -107,6 +113,8 @@ def aim_hand(
     goal = goal_of(state, character, arm)
     here = add(hand, rotate(turned, point))
     wanted = quaternion_of(state.rotation, character, arm)
+    # Beyond the blends inverse kinematics would find nothing that looks human.
+    goal = add(here, shortened(subtract(goal, here), limits.farthest)) if course == APEX else goal
     target = goal
     late = 1.0
     asked = smootherstep(state.rotation_share[character, arm])
@@ -125,7 +133,7 @@ def aim_hand(
             upper_share,
         )
         apex, apex_turned = place_hand(keys, arm, scale, apex_body, apex_rotation, row, LANES)
-        miss = subtract(goal, add(apex, rotate(apex_turned, point)))
+        miss = shortened(subtract(goal, add(apex, rotate(apex_turned, point))), limits.farthest)
         target = add(here, scaled(miss, risen))
         # A trunk that is shared with the other hand does not do what was foreseen.
         late = smootherstep(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * smootherstep(min(5.0 * other, 1.0))

@@ -55,6 +55,8 @@ class ReachLimits(NamedTuple):
     """Share of the way to the apex in which the examples take over the pose."""
     rotation_rate: float
     """Rate with which a rotation that is asked for on the way comes and goes, 1/s."""
+    farthest: float
+    """Farthest that inverse kinematics takes a hand from where the examples bring it, m."""
     example_rate: float
     """Rate of the critically damped change of the examples' weights, 1/s."""
 
@@ -500,6 +502,7 @@ def judge_hand(
 
 @parallel_kernel
 def reach_status_crowd(
+    target: Any,
     distance: Any,
     angle: Any,
     active: Any,
@@ -512,8 +515,10 @@ def reach_status_crowd(
 
     Parameters
     ----------
+    target : (N, 2, 3) float32
+        Where inverse kinematics took the hands, root frame, m.
     distance : (N, 2) float32
-        How far the points of the hands are from their targets, m.
+        How far the points of the hands are from there, m.
     angle : (N, 2) float32
         How far the hands' rotations are from those asked for, rad.
     active : (A,) int32
@@ -537,10 +542,11 @@ def reach_status_crowd(
         for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             character = active[index]
             for arm in range(2):
+                missing = subtract(vector_of(state.seen, character, arm), vector_of(target, character, arm))
                 judge_hand(
                     character,
                     arm,
-                    distance[character, arm],
+                    distance[character, arm] + norm(missing),
                     angle[character, arm],
                     dt,
                     tolerance,

@@ -120,13 +120,16 @@ def test_reach_matches_oracle(reachers, hand, course, rng):
 
 def status_after(stage, status, distance, angle, has_rotation=False, hold=math.inf):
     arrays = {name: np.zeros((1, 2)) for name in ReachState._fields}
+    arrays["seen"] = np.zeros((1, 2, 3))
     arrays["stage"] = np.full((1, 2), stage, np.uint8)
     arrays["status"] = np.full((1, 2), status, np.uint8)
     arrays["has_rotation"] = np.full((1, 2), has_rotation)
     arrays["hold_left"] = np.full((1, 2), hold)
     state = ReachState(**arrays)
     far, turned = np.full((1, 2), distance, np.float32), np.full((1, 2), angle, np.float32)
-    reach_status_crowd(far, turned, np.zeros(1, np.int32), 0.1, 1e-3, 0.0175, state)
+    reach_status_crowd(
+        np.zeros((1, 2, 3), np.float32), far, turned, np.zeros(1, np.int32), 0.1, 1e-3, 0.0175, state
+    )
     return int(state.status[0, 0]), int(state.stage[0, 0])
 
 

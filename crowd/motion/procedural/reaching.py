@@ -36,7 +36,7 @@ STANDING = {
     "low": (0.70, {"far": 0.64, "close": 0.33}),
     "middle": (1.25, {"far": 0.76, "close": 0.34}),
     "high": (1.72, {"far": 0.62}),
-    "overhead": (2.02, {"far": 0.30}),
+    "overhead": (1.98, {"far": 0.32}),
 }
 """Heights of the wrist and its distances from the root's axis, m."""
 SEATED = {
