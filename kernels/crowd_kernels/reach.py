@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
+from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.layers import smootherstep
 from crowd_kernels.quaternion import (
@@ -52,7 +52,7 @@ def shortened(vector: Vector, longest: float) -> Vector:
     return scaled(vector, min(longest / max(norm(vector), 1e-9), 1.0))
 
 
-@kernel
+@inlined_kernel
 def aim_hand(
     character: int,
     arm: int,
@@ -149,7 +149,7 @@ def aim_hand(
         out_target_rotation[character, arm, component] = turned[component]
 
 
-@kernel
+@inlined_kernel
 def reach_character(
     character: int,
     space: ReachArrays,

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from crowd_kernels._jit import inlined_kernel, kernel
+from crowd_kernels._jit import inlined_kernel
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.locomotion import ease
 from crowd_kernels.quaternion import Quaternion, multiply, normalized, rotate
@@ -183,7 +183,7 @@ def add_wanted(
         out_wanted[free] = weight
 
 
-@kernel
+@inlined_kernel
 def choose_examples(
     character: int,
     arm: int,
@@ -242,6 +242,8 @@ def choose_examples(
     back = 0.0
     for slot in range(SLOTS):
         weight = wanted[slot]
+        if weight == 0.0 and state.example_weight[character, arm, slot] == 0.0:
+            continue
         if not is_first:
             weight, rate = ease(
                 state.example_weight[character, arm, slot],
@@ -444,7 +446,7 @@ def write_pose(
         pose[3 * PADDED_JOINTS + joint] = z * scale
 
 
-@kernel
+@inlined_kernel
 def blend_body(
     character: int,
     walking_share: float,

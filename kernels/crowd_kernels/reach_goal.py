@@ -226,7 +226,7 @@ def goal_of(state: ReachState, character: int, arm: int) -> Vector:
     return goal
 
 
-@kernel
+@inlined_kernel
 def follow_target(
     character: int,
     arm: int,
@@ -301,7 +301,7 @@ def follow_target(
     state.time_left[character, arm] = max(left - dt, 0.0) if left > dt else 0.0
 
 
-@kernel
+@inlined_kernel
 def follow_rotation(
     character: int, arm: int, turned: Quaternion, limits: ReachLimits, dt: float, state: ReachState
 ) -> None:
@@ -341,7 +341,7 @@ def follow_rotation(
     set_vector(state.turn_acceleration, character, arm, (ax, ay, az))
 
 
-@kernel
+@inlined_kernel
 def track_target(
     character: int,
     arm: int,
@@ -394,7 +394,7 @@ def track_target(
     state.rotation_share[character, arm] = share + min(max((1.0 if wants else 0.0) - share, -step), step)
 
 
-@kernel
+@inlined_kernel
 def advance_course(
     character: int,
     arm: int,
@@ -460,7 +460,7 @@ def course_shares(course: float, lead: float) -> tuple[float, float]:
     return smootherstep(min(side / lead, 1.0)), smootherstep(min(max(side, 0.0), 1.0))
 
 
-@kernel
+@inlined_kernel
 def judge_hand(
     character: int,
     arm: int,
