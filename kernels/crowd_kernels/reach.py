@@ -44,6 +44,8 @@ from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 CHUNKS = 32
 ZERO = np.float32(0.0)
+SHARED_TRUNK = 0.3
+"""How much farther hands may be from their goals where both share the trunk, m."""
 
 
 @inlined_kernel
@@ -114,7 +116,8 @@ def aim_hand(
     here = add(hand, rotate(turned, point))
     wanted = quaternion_of(state.rotation, character, arm)
     # Beyond the blends inverse kinematics would find nothing that looks human.
-    goal = add(here, shortened(subtract(goal, here), limits.farthest)) if course == APEX else goal
+    farthest = limits.farthest + SHARED_TRUNK * other
+    goal = add(here, shortened(subtract(goal, here), farthest)) if course == APEX else goal
     target = goal
     late = 1.0
     asked = smootherstep(state.rotation_share[character, arm])
@@ -133,7 +136,7 @@ def aim_hand(
             upper_share,
         )
         apex, apex_turned = place_hand(keys, arm, scale, apex_body, apex_rotation, row, LANES)
-        miss = shortened(subtract(goal, add(apex, rotate(apex_turned, point))), limits.farthest)
+        miss = shortened(subtract(goal, add(apex, rotate(apex_turned, point))), farthest)
         target = add(here, scaled(miss, risen))
         # A trunk that is shared with the other hand does not do what was foreseen.
         late = smootherstep(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * smootherstep(min(5.0 * other, 1.0))

@@ -107,6 +107,8 @@ def test_a_hand_closes_holds_and_opens(run: Simulation) -> None:
 
 def test_a_held_object_follows_the_hand_of_a_walker(run: Simulation) -> None:
     holding(run)
+    # The hand leaves the place where it took the ball, which stays behind.
+    run.commands.end_reach(0)
     run.commands.set_locomotion(0, (1.3, 0.5, 0.0))
     state, objects = run.state, run.objects
     for _ in range(90):
