@@ -16,7 +16,7 @@ from crowd.checkpoint import Stateful
 from crowd.commands import Commands
 from crowd.controllers.animation import Animation
 from crowd.controllers.carrying import Carrying
-from crowd.controllers.constraint import Constraint
+from crowd.controllers.constraint import Constraint, HandHolding
 from crowd.controllers.controller import Controller, Step
 from crowd.controllers.foot_lock import FootLock
 from crowd.controllers.gaze import Gaze
@@ -123,6 +123,7 @@ class Simulation:
         self.gaze = Gaze(
             self.model.skeleton, capacity, self.navigator.avoidance, self.objects, self.model.placed
         )
+        self.constraint = Constraint(self.model.skeleton, capacity)
         self.controllers: tuple[Controller, ...] = (
             self.world_offset,
             self.idle,
@@ -131,10 +132,10 @@ class Simulation:
             self.carrying,
             self.reach,
             self.grab,
+            HandHolding(self.constraint),
             self.gaze,
         )
         self.foot_lock = FootLock(self.model.skeleton, capacity=capacity, dt=self.dt)
-        self.constraint = Constraint(self.model.skeleton, capacity)
         self.commands = Commands(self)
         self.metrics = Metrics()
         self.stage_seconds = dict.fromkeys(STAGES, 0.0)

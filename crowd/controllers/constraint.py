@@ -23,6 +23,8 @@ from crowd_kernels.ik import (
     scratch_length,
     solve_crowd,
 )
+from crowd_kernels.reach_goal import NONE as NO_REACH
+from crowd_kernels.reach_goal import RETURN
 
 EFFECTORS = ("right_hand", "left_hand", "head")
 """Joints that can be held, in the order of the state's effector axis: hands as everywhere, then the head."""
@@ -145,6 +147,25 @@ class Constraint:
         place, rotation = self._effectors(step.state, characters, np.asarray(point, np.float64))
         self.hold(step.state, characters, number, place[:, number], rotation[:, number], point)
 
+    def hold_reaches(self, step: Step) -> None:
+        """Hold hands that go to a target or stay there where layers 5 and 6 have them now; let others go.
+
+        Hands on their way back are followed still, so that the hold fades along their motion.
+        """
+        state = step.state
+        stage = state.reach_stage[step.active]
+        reaching = np.ascontiguousarray(step.active[(stage != NO_REACH).any(axis=1)])
+        if reaching.size == 0:
+            return
+        self._joints.compute(state, step.model.people, reaching)
+        place, rotation = self._effectors(state, reaching, np.zeros(3))
+        for hand in range(2):
+            stage = state.reach_stage[reaching, hand]
+            follows = stage != NO_REACH
+            rows = reaching[follows]
+            self.hold(state, rows, hand, place[follows, hand], rotation[follows, hand])
+            self.release(state, reaching[stage == RETURN], hand)
+
     def release(self, state: State, characters: npt.ArrayLike, effector: str | int) -> None:
         """Let an effector go; it finds back softly."""
         rows = np.atleast_1d(np.asarray(characters, np.int32))
@@ -238,6 +259,27 @@ class Constraint:
         place, rotation = self._effectors_model(rows, point)
         facing = np.broadcast_to(about(1, state.yaw[rows])[:, None], rotation.shape)
         return rotate(facing, place) + state.position_world[rows, None], multiply(facing, rotation)
+
+
+class HandHolding:
+    """Tells the constraint layer, between grab and gaze, where hands that reach shall stay."""
+
+    state_fields: ClassVar[tuple[str, ...]] = (
+        "constraint_task",
+        "constraint_target_world",
+        "constraint_target_rotation_world",
+        "constraint_point",
+    )
+
+    def __init__(self, constraint: Constraint) -> None:
+        self.constraint = constraint
+
+    def activate(self, state: State, characters: IntArray) -> None:
+        """Nothing to prepare: the constraint layer does."""
+
+    def evaluate(self, step: Step) -> None:
+        """Hold the hands that reach."""
+        self.constraint.hold_reaches(step)
 
 
 def effector_number(effector: str | int) -> int:

@@ -150,6 +150,28 @@ def test_what_the_layers_below_did_can_be_held_every_step():
     assert max(moved) < 0.02, "only what idle motion does"
 
 
+def test_a_hand_that_reached_stays_at_its_target_under_gaze_and_goes_home_afterwards():
+    simulation = standing_people()
+    yaw = simulation.state.yaw
+    side = np.stack([np.cos(yaw), np.zeros(COUNT), -np.sin(yaw)], axis=1)
+    ahead = np.stack([np.sin(yaw), np.zeros(COUNT), np.cos(yaw)], axis=1)
+    target = simulation.state.position_world + 0.45 * ahead - 0.15 * side + (0.0, 1.2, 0.0)
+    simulation.reach.start(simulation.state, EVERYONE, 0, target)
+    for _ in range(150):
+        simulation.step()
+    missed = []
+    sweep_gaze(simulation, lambda s: missed.append(np.linalg.norm(hands(s)[0][:, 0] - target, axis=1).max()))
+    assert max(missed) < 1.5e-3, "1 mm for the reach and 0.5 mm for the hold"
+    simulation.reach.end(simulation.state, EVERYONE, 0)
+    places = []
+    for _ in range(240):
+        simulation.step()
+        places.append(hands(simulation)[0][:, 0].copy())
+    assert (simulation.state.constraint_weight == 0).all()
+    acceleration = np.diff(places, 2, axis=0) / simulation.dt**2
+    assert np.linalg.norm(acceleration, axis=2).max() < 40.0
+
+
 @pytest.mark.parametrize("is_threaded", [False, True])
 def test_runs_with_holds_repeat_bit_for_bit_after_a_checkpoint(tmp_path, is_threaded):
     goals = (Goal(position=(0.0, 8.0)),)
