@@ -721,13 +721,15 @@ def gather_effectors(
                 row[POINT + axis * LANES + lane] = own
                 length += own * own
                 row[TARGET + axis * LANES + lane] = place[axis] if wants_place else ZERO
-            length = np.sqrt(length)
-            k = tree.effector[e]
-            while k >= 0 and k != tree.base[e]:
-                x, y, z = tree.offset[k, 0], tree.offset[k, 1], tree.offset[k, 2]
-                length += np.sqrt(x * x + y * y + z * z) * segment_scale[character, tree.segment[k]]
-                k = tree.parent[k]
-            row[LENGTH + lane] = length if tree.root_weight == 0.0 else FAR
+            row[LENGTH + lane] = np.sqrt(length) if tree.root_weight == 0.0 else FAR
+        k = tree.effector[e]
+        while k >= 0 and k != tree.base[e]:
+            x, y, z = tree.offset[k, 0], tree.offset[k, 1], tree.offset[k, 2]
+            own = np.sqrt(x * x + y * y + z * z)
+            for lane in range(LANES):
+                character = active[min(first + lane, count - 1)]
+                row[LENGTH + lane] += own * segment_scale[character, tree.segment[k]]
+            k = tree.parent[k]
     return parts
 
 

@@ -10,7 +10,7 @@ import numba
 import pytest
 from llvmlite import binding
 
-from crowd_kernels import _jit, clip, gaze_rows, lanes, pose
+from crowd_kernels import _jit, clip, gaze_rows, ik_rows, lanes, pose
 
 FEATURES = binding.get_host_cpu_features()
 ROW = numba.float32[::1]
@@ -44,6 +44,18 @@ ARITHMETIC_LEAVES = {
     gaze_rows.settle_row: (ROW, ROW, NUMBER),
     gaze_rows.aim_eye_row: (ROW, ROW, *[NUMBER] * 6),
     gaze_rows.turn_eye_row: (ROW, NUMBER, NUMBER),
+}
+QUATERNION = numba.types.UniTuple(NUMBER, 4)
+ARITHMETIC_LEAVES |= {
+    ik_rows.forward_row: (ROW, ROW, NUMBER, NUMBER, NUMBER, ROW),
+    ik_rows.pull_row: (ROW, NUMBER, NUMBER, NUMBER, ROW),
+    ik_rows.subtract_drift_row: (ROW, ROW, ROW),
+    ik_rows.accumulate_place_row: (ROW, ROW, ROW, ROW),
+    ik_rows.accumulate_frame_row: (ROW, ROW, ROW, ROW),
+    ik_rows.add_torque_row: (ROW, ROW, ROW),
+    ik_rows.step_row: (ROW, ROW, ROW),
+    ik_rows.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW),
+    ik_rows.subtract_block: (ROW, ROW, ROW),
 }
 SHUFFLE_LEAVES = {
     lanes.interleave: (ROW, ROW, ROW, ROW, INTEGER, ROW),
