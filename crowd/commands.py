@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,8 @@ from crowd.controllers.grab import GrabStatus
 from crowd.errors import SettingsError, describe
 from crowd.motion.clip import ClipKind
 from crowd.motion.rotation import about, conjugate, multiply, yaw_of
+from crowd.scenario.task_table import TaskTable
+from crowd.tasks.execution import encode_tasks
 
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
@@ -407,6 +409,35 @@ class Commands:
         if hand not in HANDS:
             raise SettingsError(describe(what, "unknown hand", hand, " or ".join(HANDS)))
         return HANDS.index(hand)
+
+    def do(self, characters: Characters, tasks: Sequence[Mapping[str, Any] | TaskTable]) -> None:
+        """Let characters do tasks after those they have, one thing after the other.
+
+        Parameters
+        ----------
+        characters : int, slice or sequence of int
+        tasks : sequence of mapping
+            As in a scenario file: ``[{"pick_up": "cup"}, {"put_down": "table"}, {"wait": 2.0}]``; see
+            `crowd.scenario.task_table.TaskTable`.
+
+        Raises
+        ------
+        ScenarioError
+            A task is not understood, or names something that is not there.
+        SettingsError
+            Somebody's list would be too long.
+        """
+        own = self._simulation.tasks
+        arrays = encode_tasks(own, tasks, "tasks")
+        rows = self._rows(characters)
+        for row in rows:
+            room = own.room(int(row))
+            if len(tasks) > room:
+                raise SettingsError(
+                    describe("do", f"list of character {row} is too long", len(tasks), f"{room} more tasks")
+                )
+        for row in rows:
+            own.give(int(row), arrays)
 
     def _rows(self, characters: Characters) -> npt.NDArray[np.int32]:
         capacity = self._simulation.state.capacity

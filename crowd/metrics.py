@@ -14,6 +14,8 @@ import numpy.typing as npt
 import shapely
 from scipy.spatial import cKDTree
 
+from crowd.hand_metrics import HandMetrics
+
 if TYPE_CHECKING:
     from crowd.recording import Recording
     from crowd.simulation import Simulation
@@ -94,6 +96,8 @@ class Metrics:
         self._bodies = BodyMetrics()
         self._feet = FootMetrics()
         self._motion = MotionMetrics()
+        self._hands = HandMetrics()
+        self._tasks: dict[str, float | int] = {}
         self._entered = 0
         self._finished = 0
         self._last_time: float | None = None
@@ -101,6 +105,9 @@ class Metrics:
     def observe(self, simulation: Simulation) -> None:
         """Take the state after a step into account."""
         state, model = simulation.state, simulation.model
+        if simulation.bodies == "people":
+            self._hands.observe(simulation)
+            self._tasks = simulation.tasks.figures()
         self.add(
             Observation(
                 simulation.time + simulation.dt,
@@ -133,7 +140,10 @@ class Metrics:
         result: dict[str, float | int] = {}
         if self._entered:
             result["finished"] = self._finished / self._entered
-        return result | self._bodies.as_dict() | self._feet.as_dict() | self._motion.as_dict()
+        parts = (self._bodies, self._feet, self._motion, self._hands)
+        for part in parts:
+            result |= part.as_dict()
+        return result | self._tasks
 
 
 class BodyMetrics:

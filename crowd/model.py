@@ -18,10 +18,12 @@ from crowd.motion.skeleton import Skeleton
 from crowd.people import People
 from crowd.scenario import PlacedCharacters, Scenario, place
 from crowd.scenario.checks import check_clips
+from crowd.scenario.furniture import place_furniture
 from crowd.scenario.objects import place_objects
 from crowd.scenario.reach import check_reachable
 from crowd.scenario.worlds import TimedObstacles, build_world
 from crowd.world import World
+from crowd.world.furniture import Furniture
 from crowd.world.objects import Objects
 
 IntArray = npt.NDArray[np.int32]
@@ -52,6 +54,8 @@ class Model:
         Obstacles that come and go by the scenario.
     objects : Objects
         Things that people can grasp: names, shapes and where they are at the start.
+    furniture : tuple of Furniture
+        Shelves, tables and seats.
     """
 
     library: MotionLibrary
@@ -64,6 +68,7 @@ class Model:
     world: World
     timetable: TimedObstacles
     objects: Objects
+    furniture: tuple[Furniture, ...]
 
     @classmethod
     def build(
@@ -91,7 +96,7 @@ class Model:
                 describe(f'motion library "{library.name}"', "has no idle clip", allowed="at least one")
             )
         names = [table.names[clip] for clip in table.example_clip]
-        check_clips(scenario, [clip.name for clip in library.clips if clip.kind is not ClipKind.LOCOMOTION])
+        check_clips(scenario, playable(library))
         placed = place(scenario, seed, characters)
         world, timetable = build_world(scenario)
         check_reachable(scenario, placed, world)
@@ -106,7 +111,12 @@ class Model:
             world,
             timetable,
             place_objects(scenario),
+            place_furniture(scenario),
         )
+
+    def playable_clips(self) -> dict[str, int]:
+        """Names of the clips that can be played, with their rows of the clip table."""
+        return {name: self.clip_table.index(name) for name in playable(self.library)}
 
     @property
     def capacity(self) -> int:
@@ -122,3 +132,8 @@ class Model:
     def radius(self) -> npt.NDArray[np.float64]:
         """Body discs, m. (N,)"""
         return self.people.radius
+
+
+def playable(library: MotionLibrary) -> list[str]:
+    """Names of the clips that can be played; locomotion examples are blended instead."""
+    return [clip.name for clip in library.clips if clip.kind is not ClipKind.LOCOMOTION]

@@ -44,6 +44,8 @@ class Population:
         self.stays_at_goal = ~model.placed.leaves_at_goal
         """The character stops at its last goal. (character,)"""
         self.routing = routing
+        self.has_tasks: BoolArray = np.zeros(model.capacity, np.bool_)
+        """The character does a list of tasks, which say when it is finished. (character,)"""
         self.stalled_time: FloatArray = np.zeros(model.capacity)
         """How long a person has stood close to its goal without getting on, s. (character,)"""
         self.flow_entered: npt.NDArray[np.int64] = np.zeros(len(model.placed.flows), np.int64)
@@ -51,7 +53,11 @@ class Population:
 
     def state_fields(self) -> dict[str, npt.NDArray[np.generic]]:
         """Arrays that change in a run."""
-        return {"stalled_time": self.stalled_time, "flow_entered": self.flow_entered}
+        return {
+            "stalled_time": self.stalled_time,
+            "flow_entered": self.flow_entered,
+            "has_tasks": self.has_tasks,
+        }
 
     def active(self, state: State) -> IntArray:
         """Rows of people in the scene, ascending."""
@@ -138,7 +144,7 @@ class Population:
             is_done = state.goal_index[arrived] >= placed.goal_count[arrived]
             begins_again = placed.repeats_goals[arrived] & (placed.goal_count[arrived] > 0)
             state.goal_index[arrived[is_done & begins_again]] = 0
-            finished = arrived[is_done & ~begins_again]
+            finished = arrived[is_done & ~begins_again & ~self.has_tasks[arrived]]
             state.is_finished[finished] = True
             state.is_active[finished[placed.leaves_at_goal[finished]]] = False
         waiting = step.active[state.is_active[step.active] & ~state.wants_to_walk[step.active]]
@@ -150,6 +156,7 @@ class Population:
         state.goal_world[rows] = goal_world
         state.goal_radius[rows] = radius
         state.goal_index[rows] = self.placed.goal_count[rows]
+        state.wanted_speed[rows] = self.model.people.preferred_speed[rows]
         state.is_finished[rows] = False
         state.wants_to_walk[rows] = True
         self.stalled_time[rows] = 0.0

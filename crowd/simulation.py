@@ -24,6 +24,7 @@ from crowd.controllers.grab import Grab
 from crowd.controllers.idle import Idle
 from crowd.controllers.locomotion import Locomotion
 from crowd.controllers.reach import Reach
+from crowd.controllers.sitting import Sitting
 from crowd.controllers.world_offset import WorldOffset
 from crowd.errors import SettingsError, describe
 from crowd.joints import Joints
@@ -34,6 +35,7 @@ from crowd.navigation.navigator import Navigator, avoidance_settings
 from crowd.population import Population
 from crowd.scenario import Scenario
 from crowd.state import Float32Array, FloatArray, IntArray, State
+from crowd.tasks import Events, Tasks
 from crowd.world.objects import ObjectState
 from crowd_kernels import _jit
 
@@ -113,6 +115,7 @@ class Simulation:
         self.population = Population(self.model, seed, self.navigator.routing)
         self.world_offset = WorldOffset()
         self.idle = Idle(capacity)
+        self.sitting = Sitting(capacity)
         self.locomotion = Locomotion(capacity)
         self.animation = Animation(capacity)
         people = self.model.people
@@ -127,6 +130,7 @@ class Simulation:
         self.controllers: tuple[Controller, ...] = (
             self.world_offset,
             self.idle,
+            self.sitting,
             self.locomotion,
             self.animation,
             self.carrying,
@@ -137,8 +141,11 @@ class Simulation:
         )
         self.foot_lock = FootLock(self.model.skeleton, capacity=capacity, dt=self.dt)
         self.commands = Commands(self)
+        self.tasks = Tasks(self)
         self.metrics = Metrics()
         self.stage_seconds = dict.fromkeys(STAGES, 0.0)
+        layers = (*self.controllers, self.constraint)
+        self.layer_seconds = dict.fromkeys((type(layer).__name__ for layer in layers), 0.0)
         self.compile_seconds = 0.0
         first = self.population.first_people()
         self.population.enter(
@@ -150,6 +157,11 @@ class Simulation:
     def time(self) -> float:
         """Simulated time, s."""
         return self.step_index * self.dt
+
+    @property
+    def events(self) -> Events:
+        """What happened to people's tasks."""
+        return self.tasks.events
 
     @property
     def is_finished(self) -> bool:
@@ -194,8 +206,10 @@ class Simulation:
         step.active = self.population.active(self.state)
 
     def _decide(self, step: Step, frame: Frame) -> None:
-        """Advance goal lists; start what the scenario plays."""
+        """Advance lists of goals and tasks; start what the scenario plays."""
         self.population.decide(step, self.commands)
+        if self.bodies == "people":
+            self.tasks.decide(step)
         step.active = self.population.active(self.state)
 
     def _navigate(self, step: Step, frame: Frame) -> None:
@@ -217,7 +231,14 @@ class Simulation:
             self.navigator.move_discs(step)
             return
         for controller in self.controllers:
-            controller.evaluate(step)
+            self._evaluate(controller, step)
+
+    def _evaluate(self, controller: Controller, step: Step) -> None:
+        """Run one layer and note its time."""
+        start = time.perf_counter()
+        controller.evaluate(step)
+        name = type(controller).__name__
+        self.layer_seconds[name] = self.layer_seconds.get(name, 0.0) + time.perf_counter() - start
 
     def _settle(self, step: Step, frame: Frame) -> None:
         """Push bodies apart, plant feet, hold effectors, and compute joints."""
@@ -237,7 +258,7 @@ class Simulation:
             state.foot_point_world,
             state.foot_contact,
         )
-        self.constraint.evaluate(step)
+        self._evaluate(self.constraint, step)
         self.joints.compute(state, model.people, step.active)
         self.grab.settle(step)
 
@@ -268,6 +289,7 @@ class Simulation:
             ("population", self.population),
             ("foot_lock", self.foot_lock),
             ("objects", self.objects),
+            ("tasks", self.tasks),
             *self.navigator.parts(),
         )
 
@@ -286,6 +308,7 @@ class Simulation:
         for controller in self.controllers:
             controller.activate(self.state, rows)
         self.foot_lock.reset(rows)
+        self.tasks.enter(rows)
         self.constraint.activate(self.state, rows)
 
 

@@ -104,6 +104,11 @@ class State:
     idle_until: FloatArray = _array()
     """Simulation time at which the next idle variation is chosen, s. (character,)"""
 
+    is_seated: BoolArray = _array(dtype=np.bool_)
+    """The person sits on a seat, or is sitting down. (character,)"""
+    sitting_time: FloatArray = _array()
+    """Progress of sitting down, as time of its clip, s; 0 while standing. (character,)"""
+
     play_clip: IntArray = _array(dtype=np.int32, fill=-1)
     """Clip that the animation layer plays, -1 for none. (character,)"""
     play_time: FloatArray = _array()
@@ -165,8 +170,6 @@ class State:
     pose_pelvis: Float32Array = _array(3, dtype=np.float32)
     """Pelvis in the root frame at leg scale 1, m. (character, 3)"""
 
-    is_seated: BoolArray = _array(dtype=np.bool_)
-    """The character sits on a seat: it reaches with the upper body alone. (character,)"""
 
     reach_stage: ByteArray = _array(2, dtype=np.uint8)
     """Stage of each hand's reach, right and left: 0 none, 1 move, 2 hold, 3 return. (character, 2)"""
@@ -258,7 +261,6 @@ class State:
     """Its rotation in the root frame. (character, 4)"""
     carry_target_world: FloatArray = _array(2, 3)
     """Targets that carrying gave the hands last, m. (character, 2, 3)"""
-
     constraint_task: ByteArray = _array(3, dtype=np.uint8)
     """What is held of right hand, left hand and head: 0 nothing, 1 position, 2 rotation, 3 both.
     (character, effector)"""

@@ -37,7 +37,7 @@ def frames(
         return 0
     from crowd.bench.frames import SCENES, SIZES, compile_kernels, measure_frames
     from crowd.bench.machine import describe_machine
-    from crowd.bench.report import print_frames, read_results, write_results
+    from crowd.bench.report import print_controllers, print_frames, read_results, write_results
 
     chosen = choose_scenes(scenes, SCENES)
     sizes = choose_sizes(characters) or list(SIZES)
@@ -55,6 +55,9 @@ def frames(
     print(", ".join(f"{key} {value}" for key, value in machine.items()))
     print(f"kernels ready after {compile_seconds:.1f} s; stages in us per person and frame")
     regressions = print_frames(rows, earlier)
+    for row in rows:
+        if row["case"] == "everything":
+            print_controllers(row)
     if json is not None:
         write_results(json, rows)
     if plot is not None:

@@ -7,21 +7,33 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from crowd.compilation import warm_up
 from crowd.scenario.schema import Area, Goal, Region, Scenario, Spread, WorldTable
 from crowd.simulation import Simulation, thread_count
 
-SCENES = ("standing", "walking_open", "walking_dense")
+SCENES = ("standing", "walking_open", "walking_dense", "reaching", "everything")
 SIZES = (10, 30, 100, 300, 1000, 3000, 10_000)
-DENSITY = {"standing": 0.5, "walking_open": 0.5, "walking_dense": 2.0}
+DENSITY = {
+    "standing": 0.5,
+    "walking_open": 0.5,
+    "walking_dense": 2.0,
+    "reaching": 0.5,
+    "everything": 0.5,
+}
 """Characters per square metre."""
 BODY_RADIUS = 0.22
 MOST_OVERLAP = 0.05
 MOST_SLIP = 0.01
-LEAST_SPEED = {"walking_open": 0.8, "walking_dense": 0.02}
+LEAST_SPEED = {"walking_open": 0.8, "walking_dense": 0.02, "everything": 0.8}
 """Mean speed below which nobody really walked, m/s."""
-WARM_UP_SECONDS = 1.0
+WARM_UP_SECONDS = 2.5
+HANDS_AT_WORK = ("reaching", "everything")
+"""Scenes in which everyone reaches, holds and looks."""
+TARGET_SECONDS = 2.0
+MOST_REACH_ERROR = 0.02
+"""Mean distance of hands at work from their targets at the end, those on the way included, m."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +50,8 @@ class FrameResult:
     ok: bool
     problem: str
     peak_memory_mb: float
+    layers: dict[str, float]
+    """The same for each layer of the controller stack."""
 
     def as_dict(self) -> dict[str, Any]:
         """Form for JSON."""
@@ -53,7 +67,7 @@ def scene(name: str, characters: int) -> Scenario:
     square = Area(x=(-side / 2, side / 2), z=(-side / 2, side / 2))
     margin = 2.0
     ground = Area(x=(-side / 2 - margin, side / 2 + margin), z=(-side / 2 - margin, side / 2 + margin))
-    walks = name != "standing"
+    walks = name in LEAST_SPEED
     region = Region(
         count=characters,
         area=square,
@@ -72,10 +86,12 @@ def measure_frames(
 ) -> FrameResult:
     """Run one scene and time its frames; compiling is done before."""
     simulation = Simulation(scene(name, characters), seed=seed, threads=threads)
+    hands = Hands(simulation) if name in HANDS_AT_WORK else None
     for _ in simulation.run(seconds=WARM_UP_SECONDS):
-        pass
-    for stage in simulation.stage_seconds:
-        simulation.stage_seconds[stage] = 0.0
+        if hands is not None:
+            hands.ask()
+    for seconds_used in (simulation.stage_seconds, simulation.layer_seconds):
+        seconds_used.update(dict.fromkeys(seconds_used, 0.0))
     start_step = simulation.step_index
     begin = time.perf_counter()
     # A slow machine gets fewer frames rather than a long wait.
@@ -83,6 +99,8 @@ def measure_frames(
         simulation.step_index - start_step < seconds / simulation.dt
         and time.perf_counter() - begin < 20 * seconds
     ):
+        if hands is not None:
+            hands.ask()
         simulation.step()
     wall = time.perf_counter() - begin
     frames = simulation.step_index - start_step
@@ -98,7 +116,49 @@ def measure_frames(
         not problem,
         problem,
         resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+        {layer: seconds_used * per_item for layer, seconds_used in simulation.layer_seconds.items()},
     )
+
+
+class Hands:
+    """Keeps everyone's right hand at work: reaching, holding, and looking there.
+
+    People who stand get a new target every two seconds. People who walk hold a point before the body, which
+    moves with them.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._random = np.random.default_rng(7)
+        self._is_walking = bool(simulation.model.placed.goal_count.any())
+        self._rows = simulation.population.active(simulation.state)
+        self._point = self._draw(self._rows.size)
+
+    def ask(self) -> None:
+        """Give new targets to those whose time has come, and take the targets along."""
+        simulation, state = self._simulation, self._simulation.state
+        period = round(TARGET_SECONDS / simulation.dt)
+        is_due = (self._rows + simulation.step_index) % period == 0
+        due = self._rows[is_due]
+        if due.size and (not self._is_walking or simulation.step_index < period):
+            self._point[is_due] = self._draw(due.size)
+            simulation.commands.reach(due, self._in_world(due), "right")
+            simulation.gaze.look_at_point(state, due, self._in_world(due))
+        if self._is_walking:
+            reaching = self._rows[state.reach_stage[self._rows, 0] > 0]
+            state.reach_target_world[reaching, 0] = self._in_world(reaching)
+            state.gaze_target_world[reaching] = self._in_world(reaching)
+
+    def _draw(self, count: int) -> npt.NDArray[np.float64]:
+        """Points before and beside the body, in the root frame at a stature of 1.75 m, m."""
+        return self._random.uniform((-0.6, 0.8, 0.35), (0.1, 1.5, 0.6), (count, 3))
+
+    def _in_world(self, rows: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
+        state, people = self._simulation.state, self._simulation.model.people
+        x, y, z = (self._point[rows] * (people.stature[rows] / 1.75)[:, None]).T
+        sine, cosine = np.sin(state.yaw[rows]), np.cos(state.yaw[rows])
+        away = np.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=1)
+        return np.asarray(state.position_world[rows] + away)
 
 
 def find_problem(simulation: Simulation, name: str) -> str:

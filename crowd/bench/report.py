@@ -74,3 +74,27 @@ def print_frames(rows: Sequence[Mapping[str, Any]], earlier: Sequence[Mapping[st
     console = Console(width=max(Console().width, 150))
     console.print(table)
     return regressions
+
+
+# Feng, Xu, Shapiro, table 2, milliseconds per character and update.
+PAPER_MILLISECONDS = {"locomotion": 0.21, "steering": 0.70, "reach": 0.70, "gaze": 0.07, "total": 1.68}
+
+
+def print_controllers(row: Mapping[str, Any]) -> None:
+    """Print one row as the paper's table 2: each controller beside the paper's own time."""
+    stages, layers = row["stages"], row["layers"]
+    parts = {
+        "locomotion": stages["locomote"] + layers["Locomotion"],
+        "steering": stages["navigate"] + stages["steer"],
+    }
+    parts |= {name.lower(): layers[name] for name in ("Reach", "Grab", "Gaze", "Constraint")}
+    parts["total"] = row["us_per_character"]
+    table = Table(box=None, pad_edge=False)
+    for title in ("controller", "us/person", "paper, us", "times"):
+        table.add_column(title, justify="left" if title == "controller" else "right")
+    for name, microseconds in parts.items():
+        paper = PAPER_MILLISECONDS.get(name)
+        cells = ("-", "-") if paper is None else (f"{1e3 * paper:,.0f}", f"{1e3 * paper / microseconds:,.0f}")
+        table.add_row(name, f"{microseconds:.2f}", *cells)
+    Console().print(f"{row['case']}, {row['characters']:,} people, {row['threads']} threads", highlight=False)
+    Console().print(table)

@@ -44,7 +44,7 @@ REACH_LIMITS = ReachLimits(
     turn_back=5.0,
     lead=0.8,
     rotation_rate=3.0,
-    farthest=0.09,
+    farthest=0.13,
     example_rate=22.0,
 )
 SOLVE = SETTINGS._replace(
@@ -63,8 +63,8 @@ class ReachSettings:
     """How hands go from target to target; larger accelerations follow moving targets more closely."""
     solve: SolveSettings = SOLVE
     """How inverse kinematics brings hands to their targets; tighter tolerances: smoother, slower."""
-    tolerance: float = 1e-3
-    """m. A hand at this distance has reached its target."""
+    tolerance: float = 7e-4
+    """m. A hand at this distance has reached its target; layers above leave up to 0.3 mm more."""
     angle_tolerance: float = 0.0174533
     """rad. Likewise for its rotation."""
 

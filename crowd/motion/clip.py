@@ -37,6 +37,8 @@ class ClipKind(StrEnum):
     TURN = "turn"
     JUMP = "jump"
     REACH = "reach"
+    SIT = "sit"
+    POSTURE = "posture"
     GESTURE = "gesture"
     HAND_POSE = "hand_pose"
     OTHER = "other"

@@ -10,6 +10,7 @@ from crowd.scenario.geometry import Ground, is_within, obstacles, overlapping_pa
 from crowd.scenario.objects import place_objects
 from crowd.scenario.schema import Goal, Scenario
 from crowd.scenario.source import Location, Problems
+from crowd.scenario.table import Point
 
 TOUCHING = 1e-3
 """Overlap of bodies with bodies or walls at the start that does not count, m."""
@@ -36,6 +37,16 @@ METRIC_KEYS = (
     "locomotion.speed_rms_relative",
     "locomotion.turn_rms_deg_s",
     "locomotion.windows",
+    "tasks.done",
+    "tasks.failed",
+    "reach.attempted",
+    "reach.completed",
+    "reach.error_mm.p50",
+    "reach.error_mm.p99",
+    "reach.error_mm.max",
+    "reach.finger_depth_mm.max",
+    "held.apart_mm.max",
+    "placed.error_mm.max",
 )
 """Metrics that a run reports and a scenario may bound."""
 
@@ -122,21 +133,33 @@ def _all_goals(scenario: Scenario) -> list[tuple[Location, Goal]]:
     return found
 
 
+def _task_points(scenario: Scenario) -> list[tuple[Location, Point]]:
+    """Ground points that tasks lead to."""
+    found: list[tuple[Location, Point]] = []
+    for key in ("characters", "regions", "flows"):
+        for index, owner in enumerate(getattr(scenario, key)):
+            for number, task in enumerate(owner.tasks):
+                for action in ("walk_to", "carry_to"):
+                    point = getattr(task, action)
+                    if isinstance(point, tuple):
+                        found.append(((key, index, "tasks", number, action), point))
+    return found
+
+
 def _check_goals(scenario: Scenario, problems: Problems) -> None:
     ground = Ground(scenario.world, only_permanent=True)
     bounds = scenario.world.bounds
     allowed = f"x {bounds.x[0]:g} to {bounds.x[1]:g}, z {bounds.z[0]:g} to {bounds.z[1]:g}"
     goals = _all_goals(scenario)
-    pointed = [(location, goal.position) for location, goal in goals if goal.position is not None]
+    pointed = [((*loc, "position"), goal.position) for loc, goal in goals if goal.position is not None]
+    pointed += _task_points(scenario)
     points = np.array([point for _, point in pointed]).reshape(-1, 2)
     is_outside, is_inside = ground.is_outside(points), ground.is_inside_obstacle(points)
     for (location, point), outside, inside in zip(pointed, is_outside, is_inside, strict=True):
         if outside:
-            problems.add((*location, "position"), "goal is outside the bounds", list(point), allowed)
+            problems.add(location, "goal is outside the bounds", list(point), allowed)
         elif inside:
-            problems.add(
-                (*location, "position"), "goal is inside a wall", list(point), "a point on free ground"
-            )
+            problems.add(location, "goal is inside a wall", list(point), "a point on free ground")
     for location, goal in goals:
         if goal.area is not None and not is_within(goal.area, bounds):
             problems.add((*location, "area"), "reaches outside the bounds", allowed=allowed)

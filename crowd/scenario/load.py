@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from crowd.errors import ScenarioError, describe, nearest_first
@@ -18,6 +18,7 @@ from crowd.scenario.checks import check
 from crowd.scenario.schema import Scenario
 from crowd.scenario.source import Location, Problems, ScenarioSource
 from crowd.scenario.steerbench import read_steerbench
+from crowd.scenario.task_table import TaskTable
 from crowd.scenario.toml_lines import key_lines
 
 SHOWN_INPUT = 60
@@ -172,6 +173,30 @@ def scenario_from(content: Mapping[str, Any], source: ScenarioSource) -> Scenari
     return scenario
 
 
+def read_tasks(entries: object, source: ScenarioSource) -> tuple[TaskTable, ...]:
+    """Check tasks as in a scenario file.
+
+    Parameters
+    ----------
+    entries : sequence of mapping or TaskTable
+    source : ScenarioSource
+        Used in messages.
+
+    Raises
+    ------
+    ScenarioError
+        With a line for each key that is wrong.
+    """
+    try:
+        return TypeAdapter(tuple[TaskTable, ...]).validate_python(entries)
+    except ValidationError as error:
+        problems = Problems(source)
+        for details in error.errors(include_url=False):
+            _add_problem(problems, details, TaskTable)
+        problems.raise_if_any()
+        raise
+
+
 def _toml_problem(path: Path, message: str) -> str:
     """Turn ``Expected '=' after a key (at line 3, column 5)`` into the form of all messages."""
     match = re.search(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$", message)
@@ -204,12 +229,14 @@ class _Verbatim:
         return self._text
 
 
-def _add_problem(problems: Problems, details: ErrorDetails) -> None:
+def _add_problem(
+    problems: Problems, details: ErrorDetails, model: type[BaseModel] = Scenario
+) -> None:
     """Turn one of pydantic's errors into a line of ours."""
     location: Location = details["loc"]
     kind, context = details["type"], details.get("ctx", {})
     if kind == "extra_forbidden":
-        known = _known_keys(location[:-1])
+        known = _known_keys(location[:-1], model)
         problems.add(location, "unknown key", allowed=nearest_first(str(location[-1]), known))
         return
     if kind == "scenario":
@@ -223,9 +250,9 @@ def _add_problem(problems: Problems, details: ErrorDetails) -> None:
     problems.add(location, what, got, allowed.format(**context) if allowed else None)
 
 
-def _known_keys(location: Location) -> list[str]:
+def _known_keys(location: Location, root: type[BaseModel]) -> list[str]:
     """Keys of the table at a location of the schema."""
-    model: type[BaseModel] | None = Scenario
+    model: type[BaseModel] | None = root
     for part in location:
         if isinstance(part, int) or model is None:
             continue

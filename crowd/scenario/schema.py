@@ -5,6 +5,7 @@ Ground points are ``[x, z]`` in metres, angles are degrees about the vertical: 0
 """
 
 from dataclasses import fields
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
@@ -14,6 +15,7 @@ from crowd.navigation.avoidance import AvoidanceSettings
 from crowd.scenario.object_table import ObjectTable
 from crowd.scenario.source import ScenarioSource
 from crowd.scenario.table import Coordinate, NotNegative, Point, Positive, Table, refuse
+from crowd.scenario.task_table import TaskTable
 
 DEFAULT_DT = 1.0 / 60.0
 
@@ -21,6 +23,7 @@ Share = Annotated[float, Field(gt=0.0, le=1.0)]
 BodyRadius = Annotated[float, Field(ge=0.1, le=2.0)]
 Speed = Annotated[float, Field(gt=0.0, le=8.0)]
 Stature = Annotated[float, Field(ge=1.0, le=2.3)]
+BoardHeight = Annotated[float, Field(gt=0.0, le=2.5)]
 OnArrival = Literal["stay", "leave"]
 Attention = Literal["listening", "talking", "thinking", "none"]
 Altitude = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -167,6 +170,11 @@ class Box(TimedObstacle):
     """Lowest and highest x, m."""
     z: tuple[Coordinate, Coordinate]
     """Lowest and highest z, m."""
+    boards: Annotated[tuple[BoardHeight, ...], Field(max_length=20)] = ()
+    """Heights of the upper sides of its boards, ascending, m: furniture such as a shelf, a table or a stool,
+    with objects on it. Solid when left out."""
+    facing: float | None = None
+    """Direction in which people sit on the lowest board, degrees; no seat when left out."""
 
     @model_validator(mode="after")
     def _is_not_empty(self) -> "Box":
@@ -174,6 +182,10 @@ class Box(TimedObstacle):
             low, high = getattr(self, key)
             if not low < high:
                 raise refuse("must rise", "[low, high] with low < high", key, [low, high])
+        if any(upper <= lower for lower, upper in pairwise(self.boards)):
+            raise refuse("must rise", "ascending heights", "boards", list(self.boards))
+        if self.facing is not None and not self.boards:
+            raise refuse("needs a board to sit on", "boards = [0.45]", "facing", self.facing)
         return self
 
 
@@ -233,8 +245,10 @@ class GoalList(Table):
 
     goals: tuple[Goal, ...] = ()
     """Done one after the other; without goals people stand."""
+    tasks: tuple[TaskTable, ...] = ()
+    """Instead of goals: what they do, one thing after the other."""
     repeat: bool = False
-    """Start again with the first goal after the last."""
+    """Start again with the first goal or task after the last."""
     gestures: tuple[str, ...] = ()
     """Clips of the motion library that are played now and then, in random order."""
     gesture_every: Positive = 8.0
@@ -249,7 +263,14 @@ class GoalList(Table):
     attention: Attention = "listening"
     """How the eyes jump about what is looked at; "none": not at all."""
     name: str | None = None
-    """For messages and for `plays`."""
+    """For messages, for `plays` and for tasks of others."""
+
+    @model_validator(mode="after")
+    def _has_goals_or_tasks(self) -> "GoalList":
+        if self.goals and self.tasks:
+            found = f"{len(self.tasks)} tasks"
+            raise refuse("cannot be given beside goals", "goals or tasks", "tasks", found)
+        return self
 
 
 class Character(GoalList):

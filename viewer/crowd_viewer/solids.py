@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from crowd.scenario.geometry import obstacles
-from crowd.scenario.schema import WorldTable
+from crowd.scenario.schema import Box, WorldTable
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -23,6 +23,8 @@ DOOR_GAP = 0.01
 BEVEL = 0.025
 """Width of the slanted rim, which catches light as edges of real things do, m."""
 UNKNOWN_HEIGHT = 1.0
+BOARD_THICKNESS, POST_THICKNESS = 0.03, 0.04
+"""Of furniture, m."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,9 @@ def scenario_solids(world: WorldTable) -> Iterator[Solid]:
     """Everything solid in a scenario's world."""
     for _, item, shape in obstacles(world):
         last = math.inf if item.disappear_at is None else item.disappear_at
-        if item.height > 0.0:
+        if isinstance(item, Box) and item.boards:
+            yield Solid(furniture(shape, item.boards, item.height), item.appear_at, last)
+        elif item.height > 0.0:
             outline = _thickened(shape) if item.is_permanent else _door(shape)
             height = item.height - (0.0 if item.is_permanent else DOOR_GAP)
             yield Solid(prism(outline, max(height, 0.5 * item.height)), item.appear_at, last)
@@ -73,19 +77,32 @@ def _door(shape: BaseGeometry) -> BaseGeometry:
     return shape if shape.area > 0.0 else shape.buffer(0.5 * DOOR_THICKNESS, cap_style="flat")
 
 
-def prism(outline: BaseGeometry, height: float) -> Float32Array:
-    """Triangles (T * 3, 7) of a prism on the ground with a slanted rim at its top."""
+def furniture(outline: BaseGeometry, boards: tuple[float, ...], height: float) -> Float32Array:
+    """Triangles (T * 3, 7) of boards on four posts over a rectangle."""
+    low_x, low_z, high_x, high_z = outline.bounds
+    top = max(height, boards[-1])
+    parts = [prism(outline, board, board - BOARD_THICKNESS) for board in boards]
+    for x in (low_x, high_x - POST_THICKNESS):
+        for z in (low_z, high_z - POST_THICKNESS):
+            parts.append(prism(shapely.box(x, z, x + POST_THICKNESS, z + POST_THICKNESS), top))
+    return np.concatenate(parts)
+
+
+def prism(outline: BaseGeometry, height: float, base: float = 0.0) -> Float32Array:
+    """Triangles (T * 3, 7) of a prism with a slanted rim at its top, and a bottom if it is off the ground."""
     parts: list[FloatArray] = []
     for polygon in getattr(outline, "geoms", [outline]):
         ring = shapely.geometry.polygon.orient(polygon, -1.0)
-        rim = min(BEVEL, 0.25 * height)
+        rim = min(BEVEL, 0.25 * (height - base))
         top = ring.buffer(-rim, join_style="mitre")
         if top.is_empty or top.geom_type != "Polygon" or len(top.interiors) != len(ring.interiors):
             top, rim = ring, 0.0
         top = shapely.geometry.polygon.orient(top, -1.0)
         parts.append(_top(top, height))
+        if base > 0.0:
+            parts.append(_bottom(ring, base))
         for lower, upper in zip(_rings(ring), _rings(top), strict=True):
-            parts.append(_band(lower, 0.0, lower, height - rim))
+            parts.append(_band(lower, base, lower, height - rim))
             if rim > 0.0 and len(lower) == len(upper):
                 start = np.argmin(((upper[:-1] - lower[0]) ** 2).sum(axis=1))
                 turned = np.roll(upper[:-1], -start, axis=0)
@@ -105,6 +122,13 @@ def _top(polygon: BaseGeometry, height: float) -> FloatArray:
         corners = np.array(shapely.geometry.polygon.orient(triangle, -1.0).exterior.coords)[:3]
         rows.extend([x, height, z, 0.0, 1.0, 0.0] for x, z in corners)
     return np.array(rows).reshape(-1, 6)
+
+
+def _bottom(polygon: BaseGeometry, height: float) -> FloatArray:
+    """Triangles of a level surface seen from below."""
+    rows = _top(polygon, height).reshape(-1, 3, 6)[:, ::-1].reshape(-1, 6)
+    rows[:, 4] = -1.0
+    return rows
 
 
 def _band(low: FloatArray, low_y: float, high: FloatArray, high_y: float) -> FloatArray:

@@ -23,7 +23,7 @@ SAME, MIRRORED = 0.03, 0.10
 ASIDE = 0.25
 """A jump farther than this from straight ahead goes to a side, rad."""
 BUILT_IN = "built-in library"
-ALWAYS_FILLED = (ClipKind.GESTURE, ClipKind.START, ClipKind.STOP)
+ALWAYS_FILLED = (ClipKind.GESTURE, ClipKind.START, ClipKind.STOP, ClipKind.SIT, ClipKind.POSTURE)
 """Kinds that the built-in library adds by name, because scenarios ask for them."""
 SAME_TURN, SAME_WAY = math.radians(1.0), 0.005
 """Clips whose joints and pelvis are nowhere farther apart hold one motion, rad and m."""

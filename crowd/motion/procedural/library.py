@@ -15,7 +15,7 @@ from crowd.motion.procedural.shape import (
     turn_shape,
     walk_shape,
 )
-from crowd.motion.procedural.standing import GESTURES, IDLES, Stance, to_clip
+from crowd.motion.procedural.standing import GESTURES, IDLES, POSTURES, SIT_DOWN, Stance, to_clip
 from crowd.motion.skeleton import Skeleton
 
 WALKS = {"walk_slow": 0.7, "walk": 1.35, "walk_fast": 1.9}
@@ -69,10 +69,15 @@ def built_in_library() -> MotionLibrary:
         stance = Stance.neutral(seconds)
         change(stance)
         clips.append(to_clip(skeleton, ground, name, ClipKind.IDLE, stance, JointMask.FULL_BODY))
-    for name, (change, seconds, mask) in GESTURES.items():
-        stance = Stance.neutral(seconds)
-        change(stance)
-        clips.append(to_clip(skeleton, ground, name, ClipKind.GESTURE, stance, mask))
+    for kind, table in ((ClipKind.GESTURE, GESTURES), (ClipKind.POSTURE, POSTURES)):
+        for name, (change, seconds, mask) in table.items():
+            stance = Stance.neutral(seconds)
+            change(stance)
+            clips.append(to_clip(skeleton, ground, name, kind, stance, mask))
+    change, seconds = SIT_DOWN
+    stance = Stance.neutral(seconds)
+    change(stance)
+    clips.append(to_clip(skeleton, ground, "sit_down", ClipKind.SIT, stance, JointMask.FULL_BODY))
     return MotionLibrary(
         "built-in", skeleton, tuple(clips), "made by the engine from published gait data", "MIT"
     )

@@ -32,8 +32,8 @@ DIRECTIONS = {"across": 52.0, "ahead": 8.0, "oblique": -42.0, "side": -92.0, "ba
 SHARE_OF_WAY = {"across": 0.94, "ahead": 1.0, "oblique": 1.0, "side": 1.0, "back": 0.88, "behind": 0.78}
 """Distances in each direction over those ahead."""
 STANDING = {
-    "floor": (0.12, {"far": 0.52, "close": 0.30}),
-    "low": (0.70, {"far": 0.64, "close": 0.33}),
+    "floor": (0.13, {"far": 0.52, "close": 0.30}),
+    "low": (0.70, {"far": 0.63, "close": 0.33}),
     "middle": (1.25, {"far": 0.76, "close": 0.34}),
     "high": (1.72, {"far": 0.62}),
     "overhead": (1.98, {"far": 0.32}),

@@ -11,7 +11,7 @@ from crowd.motion.clip import Clip, ClipKind, JointMask
 from crowd.motion.procedural.feet import FootPath, smoother
 from crowd.motion.procedural.gait import FRAME_RATE
 from crowd.motion.procedural.legs import bend_leg, lower_pelvis
-from crowd.motion.procedural.shape import GaitShape
+from crowd.motion.procedural.shape import GaitShape, standing_in_place
 from crowd.motion.procedural.upper_body import NECK_SHARE, SPINE_SHARE, curl_fingers, pose_arm
 from crowd.motion.rotation import about, continuous, multiply
 from crowd.motion.skeleton import Skeleton
@@ -19,6 +19,12 @@ from crowd.motion.skeleton import Skeleton
 FloatArray = npt.NDArray[np.float64]
 
 BREATH_SECONDS = 4.0
+SEAT_BEHIND = 0.40
+"""Pelvis of a person on a seat behind the ankles, m."""
+SEATED_PELVIS = 0.55
+"""Height of the pelvis over a seat 0.45 m high, m."""
+STANDING_RISE = 0.008
+"""Pelvis of a standing person over that of the stepping in place, m."""
 RAISE_SECONDS = 0.55
 """Time in which a gesture rises from and sinks back to hanging arms."""
 
@@ -32,6 +38,7 @@ class Stance:
 
     time: FloatArray
     shift: FloatArray
+    back: FloatArray
     sink: FloatArray
     turn: FloatArray
     lean: FloatArray
@@ -52,6 +59,7 @@ class Stance:
         arm = [0.03 + 0.008 * breath, 0.14 + 0.01 * breath, 0.26 + zero, 0.12 + zero, zero]
         return cls(
             time,
+            zero.copy(),
             zero.copy(),
             zero.copy(),
             zero.copy(),
@@ -83,7 +91,8 @@ def build_stance(skeleton: Skeleton, shape: GaitShape, stance: Stance) -> tuple[
     rotation[..., 0] = 1.0
     pelvis = np.zeros((count, 3))
     pelvis[:, 0] = stance.shift
-    pelvis[:, 1] = shape.pelvis_height + PELVIS_RISE * STATURE + 0.008 - stance.sink
+    pelvis[:, 2] = -stance.back
+    pelvis[:, 1] = shape.pelvis_height + PELVIS_RISE * STATURE + STANDING_RISE - stance.sink
     drop = -1.2 * stance.shift
     pelvis_rotation = multiply(
         about(1, 0.3 * stance.turn), multiply(about(2, drop), about(0, 0.3 * stance.lean))
@@ -280,6 +289,44 @@ def check_phone(stance: Stance) -> None:
     stance.curl["right"] += 0.6 * up
 
 
+# ---- postures, kept as long as something is carried
+
+
+def carry_right(stance: Stance) -> None:
+    """Carry something before the body with the right hand."""
+    stance.right[0] += 0.12
+    stance.right[1] += 0.02
+    stance.right[2] += 1.30
+    stance.right[3] += 0.10
+
+
+def carry_left(stance: Stance) -> None:
+    """Carry something before the body with the left hand."""
+    stance.left[0] += 0.12
+    stance.left[1] += 0.02
+    stance.left[2] += 1.30
+    stance.left[3] += 0.10
+
+
+# ---- sitting
+
+
+def sit_down(stance: Stance) -> None:
+    """Lean ahead, sink onto a seat 0.45 m high, and sit upright with the hands on the thighs."""
+    down = smoother((stance.time - 0.15) / 1.15)
+    lean = smoother(stance.time / 0.8) * (1.0 - smoother((stance.time - 0.75) / 0.75))
+    stance.back += SEAT_BEHIND * smoother((stance.time - 0.10) / 1.05)
+    standing = standing_in_place().pelvis_height + PELVIS_RISE * STATURE + STANDING_RISE
+    stance.sink += (standing - SEATED_PELVIS) * down
+    stance.lean += 0.85 * lean
+    stance.nod += 0.15 * lean
+    for arm in (stance.left, stance.right):
+        arm[0] += 0.42 * down
+        arm[1] += 0.02 * down
+        arm[2] += 0.42 * down
+        arm[3] += 0.15 * down
+
+
 Change = Callable[[Stance], None]
 IDLES: dict[str, tuple[Change, float]] = {
     "idle": (idle, 12.0),
@@ -298,3 +345,8 @@ GESTURES: dict[str, tuple[Change, float, JointMask]] = {
     "applaud": (applaud, 3.9, JointMask.ARMS),
     "check_phone": (check_phone, 5.0, JointMask.UPPER_BODY),
 }
+POSTURES: dict[str, tuple[Change, float, JointMask]] = {
+    "carry_right": (carry_right, 2.0, JointMask.RIGHT_ARM),
+    "carry_left": (carry_left, 2.0, JointMask.LEFT_ARM),
+}
+SIT_DOWN: tuple[Change, float] = (sit_down, 1.6)

@@ -1,0 +1,142 @@
+"""Figures of a run about hands: reaches that were asked and met, objects held and put down."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.motion.rotation import multiply, rotate
+from crowd.tasks.events import EventKind
+from crowd_kernels.reach_goal import MOVE, REACHED
+
+if TYPE_CHECKING:
+    from crowd.simulation import Simulation
+
+FloatArray = npt.NDArray[np.float64]
+
+MILLIMETRE = 1e3
+SAMPLE_PERIOD = 0.1
+"""Fingers are compared with what they hold at these intervals, s."""
+
+
+class HandMetrics:
+    """Accumulates figures frame by frame.
+
+    A reach is *completed* in the frame in which the hand is at its target; the error is taken in that frame.
+    """
+
+    def __init__(self) -> None:
+        self._stage: npt.NDArray[np.uint8] | None = None
+        self._status: npt.NDArray[np.uint8] | None = None
+        self._attempted = 0
+        self._errors: list[float] = []
+        self._apart = 0.0
+        self._finger_depth = 0.0
+        self._sampled_at = -np.inf
+        self._was_held = False
+        self._placed: dict[int, FloatArray] = {}
+        self._placed_error = 0.0
+        self._event_count = 0
+
+    def observe(self, simulation: Simulation) -> None:
+        """Take the state after a step into account."""
+        state = simulation.state
+        if self._stage is None or self._status is None:
+            self._stage, self._status = np.zeros_like(state.reach_stage), np.zeros_like(state.reach_status)
+        self._attempted += int(((state.reach_stage == MOVE) & (self._stage != MOVE)).sum())
+        is_new = (state.reach_status == REACHED) & (self._status != REACHED)
+        if is_new.any():
+            self._errors.extend(hand_errors(simulation, *np.nonzero(is_new)))
+        self._stage[:], self._status[:] = state.reach_stage, state.reach_status
+        if simulation.objects.count:
+            self._observe_objects(simulation)
+
+    def _observe_objects(self, simulation: Simulation) -> None:
+        objects = simulation.objects
+        for held in np.flatnonzero(objects.holder >= 0):
+            self._was_held = True
+            self._placed.pop(int(held), None)
+            for hand in np.flatnonzero(objects.holder_hand[held]):
+                self._apart = max(self._apart, _distance_from_grip(simulation, int(held), int(hand)))
+        if self._was_held and simulation.time - self._sampled_at >= SAMPLE_PERIOD:
+            self._sampled_at = simulation.time
+            self._finger_depth = max(self._finger_depth, deepest_finger(simulation))
+        self._note_placed(simulation)
+        for item, place in self._placed.items():
+            error = float(np.linalg.norm(objects.position_world[item] - place))
+            self._placed_error = max(self._placed_error, error)
+
+    def _note_placed(self, simulation: Simulation) -> None:
+        """Remember where objects should be that have just been put down."""
+        tasks, objects = simulation.tasks, simulation.objects
+        if tasks.events.count == self._event_count:
+            return
+        for event in tasks.events.last(tasks.events.count - self._event_count):
+            if event.kind is EventKind.OBJECT_PUT_DOWN:
+                item = simulation.model.objects.index(event.detail)
+                if objects.holder[item] < 0:
+                    self._placed[item] = tasks.target_world[event.character].copy()
+        self._event_count = tasks.events.count
+
+    def as_dict(self) -> dict[str, float | int]:
+        """Figures that the run exercised, by dotted key."""
+        result: dict[str, float | int] = {}
+        if self._attempted:
+            result["reach.attempted"] = self._attempted
+            result["reach.completed"] = len(self._errors)
+        if self._errors:
+            errors = MILLIMETRE * np.array(self._errors)
+            result["reach.error_mm.p50"] = float(np.quantile(errors, 0.5))
+            result["reach.error_mm.p99"] = float(np.quantile(errors, 0.99))
+            result["reach.error_mm.max"] = float(errors.max())
+        if self._was_held:
+            result["held.apart_mm.max"] = MILLIMETRE * self._apart
+            result["reach.finger_depth_mm.max"] = MILLIMETRE * self._finger_depth
+        if self._placed:
+            result["placed.error_mm.max"] = MILLIMETRE * self._placed_error
+        return result
+
+
+def deepest_finger(simulation: Simulation) -> float:
+    """How deep the deepest finger is in the object that its hand holds, m; 0 outside."""
+    objects = simulation.objects
+    item, hand = np.nonzero(objects.holder_hand & (objects.holder >= 0)[:, None])
+    if item.size == 0:
+        return 0.0
+    gaps = simulation.grab.finger_gaps(simulation.state, objects.holder[item], hand.astype(np.int32))
+    return max(0.0, -float(gaps.min()))
+
+
+def hand_errors(
+    simulation: Simulation, characters: npt.NDArray[np.intp], hands: npt.NDArray[np.intp]
+) -> FloatArray:
+    """Distances of points of hands from their targets, m. (K,)"""
+    state = simulation.state
+    position, rotation = hand_frames(simulation, characters, hands)
+    point = position + rotate(rotation, state.reach_point_hand[characters, hands])
+    return np.asarray(np.linalg.norm(point - state.reach_target_world[characters, hands], axis=1))
+
+
+def hand_frames(
+    simulation: Simulation, characters: npt.NDArray[np.intp], hands: npt.NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray]:
+    """Positions (K, 3) and rotations (K, 4) of hand joints in world space, m."""
+    state, skeleton = simulation.state, simulation.model.skeleton
+    joint = np.array([skeleton.joint("right_hand"), skeleton.joint("left_hand")])[hands]
+    half = 0.5 * state.yaw[characters]
+    zero = np.zeros_like(half)
+    turn = np.stack([np.cos(half), zero, np.sin(half), zero], axis=1)
+    position = simulation.joints.position_model[characters, joint].astype(np.float64)
+    rotation = simulation.joints.rotation_model[characters, joint].astype(np.float64)
+    return state.position_world[characters] + rotate(turn, position), multiply(turn, rotation)
+
+
+def _distance_from_grip(simulation: Simulation, item: int, hand: int) -> float:
+    """How far an object is from where its grip holds it, m."""
+    objects = simulation.objects
+    character = np.array([objects.holder[item]], np.intp)
+    position, rotation = hand_frames(simulation, character, np.array([hand], np.intp))
+    held = position[0] + rotate(rotation[0], objects.grip_position[item, hand])
+    return float(np.linalg.norm(objects.position_world[item] - held))

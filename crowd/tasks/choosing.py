@@ -1,0 +1,281 @@
+"""Choose what a task is about and where to stand for it: the first moves of tasks.
+
+All have the form ``choose(tasks, row, time) -> Outcome``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crowd.state import FloatArray, IntArray
+from crowd.tasks.present_task import free_hand, held_object, holding_hand, task_of
+from crowd.tasks.standing_place import find_standing_place
+from crowd.tasks.task_list import Hand, Target, TaskKind
+from crowd.tasks.waits import Outcome
+from crowd.world.furniture import Furniture
+
+if TYPE_CHECKING:
+    from crowd.tasks.execution import Tasks
+
+SEAT_CLEARANCE = 0.02
+"""Distance of a seated person's disc from the seat, m."""
+SEATED_REACH = 0.48
+"""Ground distance from the feet within which seated people reach things without standing up, m."""
+SEATED_SIDE = 1.1
+"""Angle to a side within which they do, rad."""
+MEETING_DISTANCE = 0.95
+"""Distance of two people who hand something over, m."""
+SPOT_GAP = 0.16
+"""Least distance between things on a board, m."""
+NEIGHBORHOOD = 3.0
+"""People farther than this from a target do not stand in the way, m."""
+HIGHEST = 1.0
+"""Height over stature above which people take other things of the kind first."""
+MOST_CONSIDERED = 10
+"""Objects or places on boards that are tried, the nearest first."""
+
+
+def choose_walk(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Find the point to walk to: given, or next to a piece of furniture."""
+    simulation = tasks.simulation
+    if tasks.lists.kind[row, tasks.index[row]] == TaskKind.CARRY_TO and held_object(tasks, row) < 0:
+        return Outcome.FAIL
+    kind, target, point = task_of(tasks, row)
+    tasks.target_world[row] = point
+    radius = float(simulation.model.radius[row])
+    if kind is Target.FURNITURE:
+        piece = _nearest_furniture(tasks, row, target)
+        tasks.target_world[row] = (*piece.spots()[0][[0]], piece.boards[-1], piece.spots()[0][2])
+        tasks.hand[row] = Hand.RIGHT
+        return Outcome.NEXT if _take_place(tasks, row) else Outcome.FAIL
+    place = simulation.model.world.nearest_walkable(point[None].copy(), radius)[0]
+    if np.isnan(place).any():
+        return Outcome.FAIL
+    tasks.place_world[row] = place
+    tasks.has_place[row] = True
+    return Outcome.NEXT
+
+
+def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Claim the nearest free object of the name, and a place from which to reach it."""
+    simulation = tasks.simulation
+    _, group, _ = task_of(tasks, row)
+    items = np.array(tasks.names.groups[group])
+    objects = simulation.objects
+    is_free = (objects.holder[items] < 0) & ((tasks.claimed_by[items] < 0) | (tasks.claimed_by[items] == row))
+    items = items[is_free & ~np.isin(items, _delivered(tasks))]
+    away = np.linalg.norm(objects.position_world[items] - simulation.state.position_world[row], axis=1)
+    tasks.hand[row] = free_hand(tasks, row)
+    is_high = objects.position_world[items, 1] > HIGHEST * simulation.model.people.stature[row]
+    nearest = items[np.lexsort((away, is_high))][:MOST_CONSIDERED]
+    # What could not be taken from one place may be taken from another; so may its neighbour.
+    for item in np.roll(nearest, -int(tasks.attempt[row]) // 2):
+        tasks.target_world[row] = objects.position_world[item]
+        if _take_place(tasks, row):
+            tasks.object[row] = item
+            tasks.claimed_by[item] = row
+            return Outcome.NEXT
+    return Outcome.FAIL
+
+
+def _delivered(tasks: Tasks) -> IntArray:
+    """Objects that somebody has put down; a family name does not mean them any more."""
+    return np.flatnonzero(tasks.is_delivered).astype(np.int32)
+
+
+def choose_touch(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Find the point to touch and a place from which to reach it."""
+    simulation = tasks.simulation
+    kind, group, point = task_of(tasks, row)
+    tasks.hand[row] = free_hand(tasks, row)
+    tasks.object[row] = -1
+    if kind is Target.OBJECTS:
+        items = np.array(tasks.names.groups[group])
+        position = simulation.objects.position_world[items]
+        nearest = int(np.argmin(np.linalg.norm(position - simulation.state.position_world[row], axis=1)))
+        tasks.object[row] = items[nearest]
+        point = position[nearest]
+    tasks.target_world[row] = point
+    return Outcome.NEXT if _take_place(tasks, row) else Outcome.FAIL
+
+
+def choose_spot(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Find a free place for what the hand holds, and a place to stand."""
+    simulation = tasks.simulation
+    item = held_object(tasks, row)
+    if item < 0:
+        return Outcome.FAIL
+    tasks.object[row] = item
+    tasks.hand[row] = holding_hand(tasks, item)
+    kind, group, point = task_of(tasks, row)
+    rotation = simulation.model.objects.start_rotation_world[item]
+    lift = np.array([0.0, -simulation.model.objects.lowest_point(item, rotation), 0.0])
+    if kind is Target.POINT:
+        tasks.target_world[row] = point + lift
+        return Outcome.NEXT if _take_place(tasks, row) else Outcome.FAIL
+    for spot in _free_spots(tasks, row, group):
+        tasks.target_world[row] = spot + lift
+        if _take_place(tasks, row):
+            return Outcome.NEXT
+    return Outcome.FAIL
+
+
+def _nearest_furniture(tasks: Tasks, row: int, group: int) -> Furniture:
+    pieces = [tasks.simulation.model.furniture[index] for index in tasks.names.groups[group]]
+    here = tasks.simulation.state.position_world[row]
+    return min(pieces, key=lambda piece: float(np.linalg.norm(piece.center - here)))
+
+
+def _free_spots(tasks: Tasks, row: int, group: int) -> list[FloatArray]:
+    """Free places on the furniture of a name, the nearest to the person first, at most ten."""
+    simulation = tasks.simulation
+    spots = np.concatenate([simulation.model.furniture[i].spots() for i in tasks.names.groups[group]])
+    objects = simulation.objects
+    used = [objects.position_world[objects.holder < 0]]
+    putting = (
+        tasks.lists.kind[np.arange(len(tasks.index)), tasks.index.clip(max=tasks.lists.length - 1)]
+    ) == (TaskKind.PUT_DOWN)
+    putting[row] = False
+    used.append(tasks.target_world[putting & tasks.has_place])
+    taken = np.concatenate(used)
+    if len(taken):
+        away = np.linalg.norm(spots[:, None, [0, 2]] - taken[None, :, [0, 2]], axis=2)
+        spots = spots[(away > SPOT_GAP).all(axis=1)]
+    order = np.argsort(np.linalg.norm(spots - simulation.state.position_world[row], axis=1), kind="stable")
+    return list(spots[order[:MOST_CONSIDERED]])
+
+
+def choose_seat(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Find a free seat and the place of the feet before it."""
+    simulation = tasks.simulation
+    _, group, _ = task_of(tasks, row)
+    radius = float(simulation.model.radius[row])
+    here = simulation.state.position_world[row]
+    found = []
+    for index in tasks.names.groups[group]:
+        place, yaw = simulation.model.furniture[index].sitting_place(radius + SEAT_CLEARANCE)
+        if simulation.model.world.is_walkable(place[None], radius)[0] and not _is_place_taken(
+            tasks, row, place
+        ):
+            found.append((float(np.linalg.norm(place - here)), index, place, yaw))
+    if not found:
+        return Outcome.FAIL
+    _, _, place, yaw = min(found, key=lambda entry: entry[:2])
+    tasks.place_world[row], tasks.place_yaw[row] = place, yaw
+    tasks.has_place[row] = True
+    return Outcome.NEXT
+
+
+def _is_place_taken(tasks: Tasks, row: int, place: FloatArray) -> bool:
+    others = tasks.has_place.copy()
+    others[row] = False
+    seated = tasks.simulation.state.is_seated.copy()
+    seated[row] = False
+    at = [tasks.place_world[others], tasks.simulation.state.position_world[seated]]
+    return bool((np.linalg.norm(np.concatenate(at) - place, axis=1) < 0.3).any())
+
+
+def choose_taker(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Find a place before the person who takes what the hand holds."""
+    simulation, state = tasks.simulation, tasks.simulation.state
+    item = held_object(tasks, row)
+    _, other, _ = task_of(tasks, row)
+    if item < 0 or other == row or not state.is_active[other]:
+        return Outcome.FAIL
+    tasks.object[row] = item
+    tasks.hand[row] = holding_hand(tasks, item)
+    ahead = state.yaw[other] + np.linspace(0.0, math.pi, 7)[:, None] * np.array([1.0, -1.0])
+    yaw = ahead.ravel()
+    places = state.position_world[other] + MEETING_DISTANCE * np.stack(
+        [np.sin(yaw), np.zeros_like(yaw), np.cos(yaw)], axis=1
+    )
+    fits = simulation.model.world.is_walkable(places, float(simulation.model.radius[row]))
+    if not fits.any():
+        return Outcome.FAIL
+    chosen = places[int(np.flatnonzero(fits)[0])]
+    tasks.place_world[row] = chosen
+    way = state.position_world[other] - chosen
+    tasks.place_yaw[row] = math.atan2(way[0], way[2])
+    tasks.has_place[row] = True
+    return Outcome.NEXT
+
+
+def face_giver(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Turn to the person who gives."""
+    state = tasks.simulation.state
+    _, other, _ = task_of(tasks, row)
+    tasks.hand[row] = free_hand(tasks, row)
+    way = state.position_world[other] - state.position_world[row]
+    tasks.place_world[row] = state.position_world[row]
+    tasks.place_yaw[row] = math.atan2(way[0], way[2])
+    tasks.has_place[row] = True
+    return Outcome.NEXT
+
+
+def choose_look(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Find what to look at."""
+    simulation = tasks.simulation
+    kind, target, point = task_of(tasks, row)
+    tasks.target_world[row] = point
+    tasks.object[row] = -1
+    if kind is Target.OBJECTS:
+        items = np.array(tasks.names.groups[target])
+        away = simulation.objects.position_world[items] - simulation.state.position_world[row]
+        tasks.object[row] = items[int(np.argmin(np.linalg.norm(away, axis=1)))]
+    return Outcome.NEXT
+
+
+def _is_in_seated_reach(tasks: Tasks, row: int, target_world: FloatArray) -> bool:
+    """A seated person reaches the point without standing up."""
+    state = tasks.simulation.state
+    if not state.is_seated[row]:
+        return False
+    way = target_world - state.position_world[row]
+    angle = (math.atan2(way[0], way[2]) - state.yaw[row] + math.pi) % (2.0 * math.pi) - math.pi
+    return math.hypot(way[0], way[2]) < SEATED_REACH and abs(angle) < SEATED_SIDE
+
+
+def _take_place(tasks: Tasks, row: int) -> bool:
+    """Choose where to stand for the target; seated people who reach it stay where they are."""
+    simulation = tasks.simulation
+    state, model = simulation.state, simulation.model
+    if _is_in_seated_reach(tasks, row, tasks.target_world[row]):
+        tasks.has_place[row] = False
+        return True
+    place = find_standing_place(
+        model.world,
+        tasks.target_world[row],
+        state.position_world[row],
+        float(model.people.stature[row]),
+        float(model.radius[row]),
+        int(tasks.hand[row]),
+        _taken_places(tasks, row),
+        int(tasks.attempt[row]),
+    )
+    if place is None:
+        return False
+    tasks.place_world[row], tasks.place_yaw[row] = place.position_world, place.yaw
+    tasks.has_place[row] = True
+    return True
+
+
+def _taken_places(tasks: Tasks, row: int) -> list[tuple[FloatArray, float]]:
+    """Where others stand for their tasks, or will, and where people stand without any."""
+    state, radius = tasks.simulation.state, tasks.simulation.model.radius
+    others = np.flatnonzero(state.is_active)
+    others = others[others != row]
+    near = np.linalg.norm(
+        np.where(tasks.has_place[others, None], tasks.place_world[others], state.position_world[others])
+        - tasks.target_world[row],
+        axis=1,
+    )
+    found = []
+    for other in others[near < NEIGHBORHOOD]:
+        if tasks.has_place[other]:
+            found.append((tasks.place_world[other], float(radius[other])))
+        elif not state.wants_to_walk[other]:
+            found.append((state.position_world[other], float(radius[other])))
+    return found

@@ -1,0 +1,58 @@
+"""Questions about a person's present task: what it is about, which hands do it, what they hold."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crowd.controllers.grab import GrabStatus
+from crowd.state import FloatArray, IntArray
+from crowd.tasks.task_list import Hand, Target
+
+if TYPE_CHECKING:
+    from crowd.tasks.execution import Tasks
+
+
+def rows_of(row: int) -> IntArray:
+    return np.array([row], np.int32)
+
+
+def task_of(tasks: Tasks, row: int) -> tuple[Target, int, FloatArray]:
+    """What the present task is about: kind of target, its index, its point."""
+    column = tasks.index[row]
+    lists = tasks.lists
+    return (
+        Target(int(lists.target_kind[row, column])),
+        int(lists.target[row, column]),
+        lists.point[row, column],
+    )
+
+
+def hands_of(tasks: Tasks, row: int) -> tuple[int, ...]:
+    """The hands that do the present task."""
+    hand = int(tasks.hand[row])
+    return (0, 1) if hand == Hand.BOTH else (hand,)
+
+
+def held_object(tasks: Tasks, row: int) -> int:
+    """The object that the person holds, -1 for none."""
+    held = np.flatnonzero(tasks.simulation.objects.holder == row)
+    return int(held[0]) if held.size else -1
+
+
+def holding_hand(tasks: Tasks, item: int) -> int:
+    right, left = tasks.simulation.objects.holder_hand[item]
+    return Hand.BOTH if right and left else Hand.LEFT if left else Hand.RIGHT
+
+
+def free_hand(tasks: Tasks, row: int) -> int:
+    """The hand that the task asks for; without a wish both for what was too big, or one that is empty."""
+    wanted = int(tasks.lists.hand[row, tasks.index[row]])
+    if wanted != Hand.ANY:
+        return wanted
+    if (tasks.simulation.state.grab_status[row] == GrabStatus.TOO_BIG).any():
+        return Hand.BOTH
+    objects = tasks.simulation.objects
+    mine = objects.holder == row
+    return Hand.LEFT if (objects.holder_hand[mine, 0]).any() else Hand.RIGHT

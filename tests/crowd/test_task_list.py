@@ -1,0 +1,102 @@
+"""Task lists are checked with file, line and key, and names stand for one thing or for all of a kind."""
+
+import pytest
+
+import crowd
+from crowd.errors import ScenarioError, SettingsError
+from crowd.scenario.task_table import ACTIONS
+from crowd.tasks.task_list import TaskKind, families
+
+SCENE = """
+[world]
+bounds = {{ x = [-5.0, 5.0], z = [-5.0, 5.0] }}
+boxes = [{{ name = "table_1", x = [-1.0, 1.0], z = [2.0, 2.6], height = 0.75, boards = [0.75] }}]
+
+[[objects]]
+name = "cup_1"
+shape = "sphere"
+radius = 0.04
+position = [0.0, 0.75, 2.2]
+resting = true
+
+[[characters]]
+name = "ann"
+position = [0.0, 0.0]
+tasks = [{tasks}]
+"""
+
+
+def load(folder, tasks):
+    path = folder / "room.toml"
+    path.write_text(SCENE.format(tasks=tasks), encoding="utf-8")
+    return crowd.Simulation(crowd.load_scenario(path), threads=1)
+
+
+def test_names_stand_for_their_families():
+    assert families(("cup_1", "cup_2[0]", "mug")) == {
+        "cup_1": (0,),
+        "cup": (0, 1),
+        "cup_2[0]": (1,),
+        "cup_2": (1,),
+        "mug": (2,),
+    }
+
+
+@pytest.mark.parametrize(
+    ("tasks", "message"),
+    [
+        ('{ pick_up = "cop" }', "tasks[0].pick_up: nothing to pick up has this name; got 'cop'"),
+        ('{ sit = "table" }', "tasks[0].sit: nothing to sit has this name; got 'table'"),
+        ('{ play = "walk" }', "tasks[0].play: nothing to play has this name; got 'walk'"),
+        ('{ hand_over = "anne" }', "tasks[0].hand_over: nothing to hand over has this name; got 'anne'"),
+        ("{ walk_to = [9.0, 0.0] }", "tasks[0].walk_to: goal is outside the bounds; got [9.0, 0.0]"),
+        ("{ walk_to = [0.0, 2.3] }", "tasks[0].walk_to: goal is inside a wall; got [0.0, 2.3]"),
+        ("{ walk_to = 3 }", "tasks[0].walk_to: is neither a name nor a point; got 3"),
+        ("{ wait = -1.0 }", "tasks[0].wait: is out of range; got -1.0; allowed >= 0"),
+        ("{ wait = nan }", "tasks[0].wait: must be finite; got nan"),
+        ("{ weight = 1.0 }", "tasks[0].weight: unknown key; allowed \"wait\""),
+        ('{ wait = 1.0, play = "nod" }', "tasks[0]: needs exactly one action; got 'wait and play'"),
+        ("{ }", "tasks[0]: needs exactly one action; got 'none'"),
+        ('{ wait = 1.0, hand = "left" }', "tasks[0].hand: means nothing for wait; got 'left'"),
+    ],
+)
+def test_what_is_wrong_with_a_task_is_one_line(tmp_path, tasks, message):
+    with pytest.raises(ScenarioError) as caught:
+        load(tmp_path, tasks)
+    lines = str(caught.value).splitlines()
+    assert any(line.startswith(f"room.toml: line 16: characters[0].{message}") for line in lines), lines
+
+
+def test_goals_and_tasks_exclude_each_other(tmp_path):
+    with pytest.raises(ScenarioError, match="cannot be given beside goals; got '1 tasks'; allowed goals or"):
+        load(tmp_path, "{ wait = 1.0 }]\ngoals = [{ position = [1.0, 1.0] }")
+
+
+def test_programs_give_tasks_in_the_same_words(tmp_path):
+    simulation = load(tmp_path, "{ wait = 0.1 }")
+    simulation.commands.do(0, [{"look_at": "cup_1", "seconds": 0.2}, {"play": "nod"}])
+    for _ in simulation.run(seconds=5.0):
+        if simulation.is_finished:
+            break
+    assert [event.task for event in simulation.events] == ["wait", "look_at", "play"]
+    assert simulation.state.is_finished[0]
+
+
+def test_programs_are_told_what_is_wrong(tmp_path):
+    simulation = load(tmp_path, "{ wait = 0.1 }")
+    with pytest.raises(ScenarioError, match=r"nothing to pick up has this name; got 'cap'; allowed \"cup\""):
+        simulation.commands.do(0, [{"pick_up": "cap"}])
+    with pytest.raises(SettingsError, match="list of character 0 is too long; got 8; allowed 7 more tasks"):
+        simulation.commands.do(0, [{"wait": 1.0}] * 8)
+
+
+def test_a_person_without_anything_cannot_put_it_down(tmp_path):
+    simulation = load(tmp_path, '{ put_down = "table" }')
+    for _ in simulation.run(seconds=3.0):
+        pass
+    assert not simulation.state.is_finished[0]
+    assert simulation.tasks.look[0] >= 2
+
+
+def test_kinds_of_tasks_are_the_actions_of_scenarios():
+    assert tuple(kind.name.lower() for kind in TaskKind) == ACTIONS

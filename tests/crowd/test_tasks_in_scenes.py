@@ -1,0 +1,130 @@
+"""People do what their task lists say: whole scenes with objects, seats and each other."""
+
+import numpy as np
+import pytest
+
+import crowd
+from crowd.tasks.events import EventKind
+
+ROOM = """
+[world]
+bounds = {{ x = [-5.0, 5.0], z = [-5.0, 5.0] }}
+boxes = [
+    {{ name = "table", x = [-1.5, 1.5], z = [2.0, 2.7], height = 0.75, boards = [0.75] }},
+    {{ name = "shelf", x = [-1.5, 1.5], z = [-3.0, -2.6], height = 1.5, boards = [0.5, 1.1] }},
+    {{ name = "stool", x = [3.0, 3.4], z = [0.0, 0.4], height = 0.45, boards = [0.45], facing = 180 }},
+]
+
+[[objects]]
+name = "can_1"
+shape = "capsule"
+radius = 0.035
+length = 0.15
+position = [0.4, 1.1, -2.8]
+resting = true
+
+[[objects]]
+name = "can_2"
+shape = "capsule"
+radius = 0.035
+length = 0.15
+position = [-0.6, 0.5, -2.8]
+resting = true
+
+{people}
+"""
+
+
+def scene(folder, people, **how):
+    path = folder / "room.toml"
+    path.write_text(ROOM.format(people=people), encoding="utf-8")
+    return crowd.Simulation(crowd.load_scenario(path), threads=1, **how)
+
+
+def person(name, x, z, tasks):
+    return f'[[characters]]\nname = "{name}"\nposition = [{x}, {z}]\nfacing = 0\ntasks = [{tasks}]\n'
+
+
+def finish(simulation, seconds):
+    for _ in simulation.run(seconds=seconds):
+        if simulation.is_finished:
+            return
+    pytest.fail(f"still busy: {list(simulation.events)[-3:]}")
+
+
+def done(simulation):
+    return [event.task for event in simulation.events if event.kind is EventKind.TASK_DONE]
+
+
+def test_what_is_fetched_stands_on_the_table_afterwards(tmp_path):
+    simulation = scene(tmp_path, person("ann", 0.0, 0.0, '{ pick_up = "can_1" }, { put_down = "table" }'))
+    start = simulation.objects.position_world.copy()
+    finish(simulation, 60.0)
+    x, y, z = simulation.objects.position_world[0]
+    assert -1.5 < x < 1.5
+    assert 2.0 < z < 2.7
+    assert y == pytest.approx(0.75 + 0.075, abs=1e-6)
+    assert np.array_equal(simulation.objects.position_world[1], start[1])
+    figures = simulation.metrics.as_dict()
+    assert figures["held.apart_mm.max"] < 1.0
+    assert figures["placed.error_mm.max"] < 10.0
+    assert figures["reach.finger_depth_mm.max"] < 1.0
+    assert figures["tasks.failed"] == 0
+
+
+def test_two_people_take_two_things_of_one_kind(tmp_path):
+    tasks = '{ pick_up = "can" }'
+    simulation = scene(tmp_path, person("ann", 0.4, 0.0, tasks) + person("ben", -0.4, 0.0, tasks))
+    finish(simulation, 60.0)
+    assert sorted(simulation.objects.holder.tolist()) == [0, 1]
+
+
+def test_what_is_handed_over_changes_hands(tmp_path):
+    people = person("ann", 0.0, -1.0, '{ pick_up = "can_1" }, { hand_over = "ben" }')
+    people += person("ben", 0.0, 0.5, '{ take_from = "ann" }')
+    simulation = scene(tmp_path, people)
+    finish(simulation, 90.0)
+    assert simulation.objects.holder[0] == 1
+    assert (simulation.state.grab_object[0] < 0).all()
+
+
+def test_people_sit_on_seats_and_stand_up_to_walk(tmp_path):
+    simulation = scene(tmp_path, person("ann", 1.0, -1.0, '{ sit = "stool" }, { walk_to = [0.0, 0.0] }'))
+    lowest = np.inf
+    for _ in simulation.run(seconds=60.0):
+        lowest = min(lowest, float(simulation.joints.position_model[0, 0, 1]))
+        if simulation.is_finished:
+            break
+    assert lowest == pytest.approx(0.55 * simulation.model.people.stride_scale[0], abs=0.06)
+    assert done(simulation) == ["sit", "walk_to"]
+    assert not simulation.state.is_seated[0]
+
+
+def test_a_point_is_touched_with_the_finger_tips(tmp_path):
+    simulation = scene(tmp_path, person("ann", 0.0, 0.0, "{ touch = [0.5, 0.9, 2.2], seconds = 0.5 }"))
+    nearest = np.inf
+    for _ in simulation.run(seconds=30.0):
+        names = simulation.model.skeleton
+        tip = simulation.joint_positions_world()[0, names.joint("right_middle_3")]
+        nearest = min(nearest, float(np.linalg.norm(tip - [0.5, 0.9, 2.2])))
+        if simulation.is_finished:
+            break
+    assert done(simulation) == ["touch"]
+    assert nearest < 0.06
+
+
+def test_a_run_with_tasks_goes_on_after_a_stop_with_equal_bits(tmp_path):
+    people = person("ann", 0.0, 0.0, '{ pick_up = "can_1" }, { put_down = "table" }')
+    whole = scene(tmp_path, people, seed=4)
+    for _ in whole.run(seconds=9.0):
+        pass
+    first, second = scene(tmp_path, people, seed=4), scene(tmp_path, people, seed=4)
+    for _ in first.run(seconds=4.0):
+        pass
+    first.save(tmp_path / "stop.npz")
+    second.restore(tmp_path / "stop.npz")
+    for _ in second.run(seconds=5.0):
+        pass
+    assert second.step_index == whole.step_index
+    assert np.array_equal(whole.state.pose_rotation, second.state.pose_rotation)
+    assert np.array_equal(whole.objects.position_world, second.objects.position_world)
