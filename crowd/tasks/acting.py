@@ -22,6 +22,7 @@ from crowd_kernels.reach_goal import NONE
 if TYPE_CHECKING:
     from crowd.tasks.execution import Tasks
 
+CARRYING_CLIPS = ("carry_right", "carry_left")
 ARRIVAL_RADIUS = 0.3
 """Distance at which walking to a place ends and settling there begins, m."""
 OFFER_HEIGHT, OFFER_DISTANCE = 0.66, 0.45
@@ -129,7 +130,7 @@ def lift(tasks: Tasks, row: int, time: float) -> Outcome:
     for hand in hands_of(tasks, row):
         simulation.reach.end(simulation.state, rows, hand)
     if tasks.hand[row] != Hand.BOTH:
-        simulation.commands.play(row, ("carry_right", "carry_left")[tasks.hand[row]], seconds=math.inf)
+        simulation.commands.play(row, CARRYING_CLIPS[tasks.hand[row]], seconds=math.inf)
     return Outcome.WAIT
 
 

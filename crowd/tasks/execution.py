@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.controllers.controller import Step
+from crowd.controllers.sitting import SittingSettings
+from crowd.motion.library import MotionLibrary
 from crowd.state import BoolArray, FloatArray, IntArray
-from crowd.tasks.acting import let_go_of_everything
+from crowd.tasks.acting import CARRYING_CLIPS, let_go_of_everything
 from crowd.tasks.events import EventKind, Events
 from crowd.tasks.programs import PROGRAMS
 from crowd.tasks.settle import settle_parameters
@@ -78,6 +80,8 @@ class Tasks:
         self.events = Events()
         self.names = TaskNames.build(model.placed, model.objects, model.furniture, model.playable_clips())
         self.lists: TaskArrays = scenario_tasks(simulation.scenario, model.placed, self.names)
+        if self.lists.count.any():
+            require_clips(model.library)
         capacity = model.capacity
         self.index: IntArray = np.zeros(capacity, np.int32)
         self.move: npt.NDArray[np.uint8] = np.zeros(capacity, np.uint8)
@@ -263,6 +267,18 @@ class Tasks:
             )
 
 
+def require_clips(library: MotionLibrary) -> None:
+    """Check that a library has what tasks play.
+
+    Raises
+    ------
+    MotionError
+        It lacks one of the clips; importing it anew fills it from the built-in library.
+    """
+    for name in (*CARRYING_CLIPS, SittingSettings().clip):
+        library.clip(name)
+
+
 def encode_tasks(tasks: Tasks, entries: Any, label: str) -> TaskArrays:
     """Turn task tables as in a scenario file into a row of arrays.
 
@@ -270,10 +286,13 @@ def encode_tasks(tasks: Tasks, entries: Any, label: str) -> TaskArrays:
     ------
     ScenarioError
         With a line for each problem.
+    MotionError
+        The motion library lacks a clip that tasks play.
     """
     from crowd.scenario.load import read_tasks
     from crowd.scenario.source import Problems, ScenarioSource
 
+    require_clips(tasks.simulation.model.library)
     source = ScenarioSource(label=label)
     tables = read_tasks(entries, source)
     problems = Problems(source)

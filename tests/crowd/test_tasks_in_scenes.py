@@ -1,9 +1,13 @@
 """People do what their task lists say: whole scenes with objects, seats and each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import crowd
+from crowd.errors import MotionError
+from crowd.motion.procedural import built_in_library
 from crowd.tasks.events import EventKind
 
 ROOM = """
@@ -128,3 +132,10 @@ def test_a_run_with_tasks_goes_on_after_a_stop_with_equal_bits(tmp_path):
     assert second.step_index == whole.step_index
     assert np.array_equal(whole.state.pose_rotation, second.state.pose_rotation)
     assert np.array_equal(whole.objects.position_world, second.objects.position_world)
+
+
+def test_a_library_without_the_clips_of_tasks_is_refused_before_the_run(tmp_path):
+    library = built_in_library()
+    fewer = replace(library, clips=tuple(clip for clip in library.clips if clip.name != "carry_left"))
+    with pytest.raises(MotionError, match="no clip has this name; got 'carry_left'; allowed"):
+        scene(tmp_path, person("ann", 0.0, 0.0, "{ wait = 1.0 }"), motions=fewer)
