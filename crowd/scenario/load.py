@@ -18,7 +18,7 @@ from crowd.scenario.checks import check
 from crowd.scenario.schema import Scenario
 from crowd.scenario.source import Location, Problems, ScenarioSource
 from crowd.scenario.steerbench import read_steerbench
-from crowd.scenario.task_table import TaskTable
+from crowd.scenario.task_table import ALTERNATIVES, TaskTable
 from crowd.scenario.toml_lines import key_lines
 
 SHOWN_INPUT = 60
@@ -229,11 +229,9 @@ class _Verbatim:
         return self._text
 
 
-def _add_problem(
-    problems: Problems, details: ErrorDetails, model: type[BaseModel] = Scenario
-) -> None:
+def _add_problem(problems: Problems, details: ErrorDetails, model: type[BaseModel] = Scenario) -> None:
     """Turn one of pydantic's errors into a line of ours."""
-    location: Location = details["loc"]
+    location: Location = tuple(part for part in details["loc"] if part not in ALTERNATIVES)
     kind, context = details["type"], details.get("ctx", {})
     if kind == "extra_forbidden":
         known = _known_keys(location[:-1], model)

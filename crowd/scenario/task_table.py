@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from crowd.scenario.table import Coordinate, NotNegative, Point, Table, refuse
 
@@ -24,6 +24,8 @@ ACTIONS = (
     "play",
 )
 """Keys that say what a task is; each task has exactly one of them."""
+ALTERNATIVES = NAME, POINT = "a name", "a point"
+"""What may stand for one key; they are parts of pydantic's locations, not of ours."""
 USES_A_HAND = frozenset({"pick_up", "put_down", "touch", "hand_over", "take_from"})
 USES_SECONDS = frozenset({"touch", "look_at"})
 
@@ -43,9 +45,17 @@ def _name_or(count: int) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+def _alternative(value: Any) -> str:
+    return NAME if isinstance(value, str) else POINT
+
+
 Name = Annotated[str, Field(min_length=1)]
-Somewhere = Annotated[Name | Point, _name_or(2)]
-Something = Annotated[Name | SpacePoint, _name_or(3)]
+Somewhere = Annotated[
+    Annotated[Name, Tag(NAME)] | Annotated[Point, Tag(POINT)], Discriminator(_alternative), _name_or(2)
+]
+Something = Annotated[
+    Annotated[Name, Tag(NAME)] | Annotated[SpacePoint, Tag(POINT)], Discriminator(_alternative), _name_or(3)
+]
 
 
 class TaskTable(Table):
