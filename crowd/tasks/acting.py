@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crowd.controllers.grab import HOLDING
-from crowd.motion.rotation import about, conjugate, multiply
+from crowd.motion.rotation import about, conjugate, multiply, yaw_of
 from crowd.state import FloatArray
 from crowd.tasks.events import EventKind
 from crowd.tasks.present_task import hands_of, held_object, rows_of, task_of
@@ -165,7 +165,7 @@ def heading_of(tasks: Tasks, item: int) -> float:
     """How far the object has been turned about the vertical since the start, rad."""
     start = tasks.simulation.model.objects.start_rotation_world[item]
     turned = multiply(tasks.simulation.objects.rotation_world[item], conjugate(start))
-    return 2.0 * math.atan2(float(turned[2]), float(turned[0]))
+    return float(yaw_of(turned))
 
 
 def let_go(tasks: Tasks, row: int, time: float) -> Outcome:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crowd.state import FloatArray, IntArray
-from crowd.tasks.present_task import free_hand, held_object, holding_hand, task_of
+from crowd.tasks.present_task import free_hand, held_object, holding_hand, task_of, wanted_hand
 from crowd.tasks.standing_place import find_standing_place
 from crowd.tasks.task_list import Hand, Target, TaskKind
 from crowd.tasks.waits import Outcome
@@ -42,13 +42,13 @@ def choose_walk(tasks: Tasks, row: int, time: float) -> Outcome:
     """Find the point to walk to: given, or next to a piece of furniture."""
     simulation = tasks.simulation
     if tasks.lists.kind[row, tasks.index[row]] == TaskKind.CARRY_TO and held_object(tasks, row) < 0:
-        return Outcome.FAIL
+        return Outcome.EMPTY_HANDED
     kind, target, point = task_of(tasks, row)
     tasks.target_world[row] = point
     radius = float(simulation.model.radius[row])
     if kind is Target.FURNITURE:
         piece = _nearest_furniture(tasks, row, target)
-        tasks.target_world[row] = (*piece.spots()[0][[0]], piece.boards[-1], piece.spots()[0][2])
+        tasks.target_world[row] = piece.spots()[0]
         tasks.hand[row] = Hand.RIGHT
         return Outcome.NEXT if _take_place(tasks, row) else Outcome.FAIL
     place = simulation.model.world.nearest_walkable(point[None].copy(), radius)[0]
@@ -72,7 +72,7 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     is_high = objects.position_world[items, 1] > HIGHEST * simulation.model.people.stature[row]
     nearest = items[np.lexsort((away, is_high))][:MOST_CONSIDERED]
     # What could not be taken from one place may be taken from another; so may its neighbour.
-    for item in np.roll(nearest, -int(tasks.attempt[row]) // 2):
+    for item in np.roll(nearest, -((int(tasks.attempt[row]) + 1) // 2)):
         tasks.target_world[row] = objects.position_world[item]
         if _take_place(tasks, row):
             tasks.object[row] = item
@@ -105,9 +105,9 @@ def choose_touch(tasks: Tasks, row: int, time: float) -> Outcome:
 def choose_spot(tasks: Tasks, row: int, time: float) -> Outcome:
     """Find a free place for what the hand holds, and a place to stand."""
     simulation = tasks.simulation
-    item = held_object(tasks, row)
+    item = held_object(tasks, row, wanted_hand(tasks, row))
     if item < 0:
-        return Outcome.FAIL
+        return Outcome.EMPTY_HANDED
     tasks.object[row] = item
     tasks.hand[row] = holding_hand(tasks, item)
     kind, group, point = task_of(tasks, row)
@@ -181,9 +181,11 @@ def _is_place_taken(tasks: Tasks, row: int, place: FloatArray) -> bool:
 def choose_taker(tasks: Tasks, row: int, time: float) -> Outcome:
     """Find a place before the person who takes what the hand holds."""
     simulation, state = tasks.simulation, tasks.simulation.state
-    item = held_object(tasks, row)
+    item = held_object(tasks, row, wanted_hand(tasks, row))
     _, other, _ = task_of(tasks, row)
-    if item < 0 or other == row or not state.is_active[other]:
+    if item < 0:
+        return Outcome.EMPTY_HANDED
+    if other == row or not state.is_active[other]:
         return Outcome.FAIL
     tasks.object[row] = item
     tasks.hand[row] = holding_hand(tasks, item)

@@ -196,6 +196,9 @@ class Tasks:
             if outcome is Outcome.FAIL:
                 self._look_again(row, time)
                 return
+            if outcome is Outcome.EMPTY_HANDED:
+                self._give_up(row, time, "the hands are empty")
+                return
 
     def _time_out(self, row: int, time: float) -> None:
         """End a move whose time is over: waiting for time ends so, everything else has failed."""

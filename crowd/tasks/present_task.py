@@ -35,9 +35,18 @@ def hands_of(tasks: Tasks, row: int) -> tuple[int, ...]:
     return (0, 1) if hand == Hand.BOTH else (hand,)
 
 
-def held_object(tasks: Tasks, row: int) -> int:
-    """The object that the person holds, -1 for none."""
-    held = np.flatnonzero(tasks.simulation.objects.holder == row)
+def wanted_hand(tasks: Tasks, row: int) -> int:
+    """The hand that the present task asks for."""
+    return int(tasks.lists.hand[row, tasks.index[row]])
+
+
+def held_object(tasks: Tasks, row: int, hand: int = Hand.ANY) -> int:
+    """The object that the person holds, in a certain hand if one is given; -1 for none."""
+    objects = tasks.simulation.objects
+    is_held = objects.holder == row
+    if hand in (Hand.RIGHT, Hand.LEFT):
+        is_held &= objects.holder_hand[:, hand]
+    held = np.flatnonzero(is_held)
     return int(held[0]) if held.size else -1
 
 
@@ -48,7 +57,7 @@ def holding_hand(tasks: Tasks, item: int) -> int:
 
 def free_hand(tasks: Tasks, row: int) -> int:
     """The hand that the task asks for; without a wish both for what was too big, or one that is empty."""
-    wanted = int(tasks.lists.hand[row, tasks.index[row]])
+    wanted = wanted_hand(tasks, row)
     if wanted != Hand.ANY:
         return wanted
     if (tasks.simulation.state.grab_status[row] == GrabStatus.TOO_BIG).any():

@@ -18,6 +18,7 @@ from crowd.world.objects import Objects
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 
+
 class TaskKind(IntEnum):
     """What a task is; named and ordered as `crowd.scenario.task_table.ACTIONS`."""
 

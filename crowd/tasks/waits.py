@@ -34,6 +34,9 @@ class Outcome(Enum):
     NEXT = 0
     WAIT = 1
     FAIL = 2
+    """Nothing suitable is there now; worth another look."""
+    EMPTY_HANDED = 3
+    """There is nothing in the hands to do it with."""
 
 
 class Wait(IntEnum):

@@ -83,6 +83,17 @@ def test_two_people_take_two_things_of_one_kind(tmp_path):
     assert sorted(simulation.objects.holder.tolist()) == [0, 1]
 
 
+def test_of_two_things_the_named_hand_puts_its_own_down(tmp_path):
+    tasks = (
+        '{ pick_up = "can_1", hand = "right" }, { pick_up = "can_2", hand = "left" }, '
+        '{ put_down = "table", hand = "left" }'
+    )
+    simulation = scene(tmp_path, person("ann", 0.0, 0.0, tasks))
+    finish(simulation, 60.0)
+    assert done(simulation) == ["pick_up", "pick_up", "put_down"]
+    assert simulation.objects.holder.tolist() == [0, -1]
+
+
 def test_what_is_handed_over_changes_hands(tmp_path):
     people = person("ann", 0.0, -1.0, '{ pick_up = "can_1" }, { hand_over = "ben" }')
     people += person("ben", 0.0, 0.5, '{ take_from = "ann" }')
