@@ -170,7 +170,6 @@ class State:
     pose_pelvis: Float32Array = _array(3, dtype=np.float32)
     """Pelvis in the root frame at leg scale 1, m. (character, 3)"""
 
-
     reach_stage: ByteArray = _array(2, dtype=np.uint8)
     """Stage of each hand's reach, right and left: 0 none, 1 move, 2 hold, 3 return. (character, 2)"""
     reach_status: ByteArray = _array(2, dtype=np.uint8)
@@ -223,6 +222,16 @@ class State:
     """Their weights, which follow those of the goal. (character, 2, 24)"""
     reach_example_weight_rate: FloatArray = _array(2, SLOTS)
     """1/s. (character, 2, 24)"""
+    reach_example_wanted: FloatArray = _array(2, SLOTS)
+    """Weights that they come to. (character, 2, 24)"""
+    reach_example_count: IntArray = _array(2, dtype=np.int32)
+    """Place after the last example that is blended. (character, 2)"""
+    reach_looked_up: FloatArray = _array(2, 3)
+    """Where the wrist was when examples were last looked up, root frame, m. (character, 2, 3)"""
+    reach_looked_up_pelvis: FloatArray = _array(2, 3)
+    """Where the pelvis was then, m. (character, 2, 3)"""
+    reach_looked_up_share: FloatArray = _array(2)
+    """Share of the upper body's examples then, 0 to 1. (character, 2)"""
 
     grab_stage: ByteArray = _array(2, dtype=np.uint8)
     """Stage of each hand, right and left: 0 open, 1 closing, 2 holding, 3 opening. (character, 2)"""

@@ -20,7 +20,7 @@ from crowd.motion.skeleton import Segment, Skeleton
 from crowd.state import FloatArray, IntArray, State
 from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
 from crowd_kernels.reach import CHUNKS, reach_crowd
-from crowd_kernels.reach_blend import ROW, SLOTS
+from crowd_kernels.reach_blend import ROW
 from crowd_kernels.reach_goal import (
     MOVE,
     MOVING,
@@ -89,7 +89,7 @@ class Reach:
         self._tree = joint_tree(library.skeleton, EFFECTORS)
         capacity, size = len(stature), SCRATCH + MOST_SAMPLES
         self._number = np.zeros((CHUNKS, size), np.int32)
-        self._real = np.zeros((CHUNKS, size + SLOTS))
+        self._real = np.zeros((CHUNKS, size))
         self._rows = np.zeros((CHUNKS, 2 * ROW), np.float32)
         length = scratch_length(len(self._tree.joint), len(EFFECTORS), len(Segment))
         self._solve_scratch = np.zeros((CHUNKS, length), np.float32)

@@ -39,7 +39,7 @@ from crowd_kernels.reach_goal import (
     track_target,
     vector_of,
 )
-from crowd_kernels.reach_space import MOST_SAMPLES, SCRATCH, ReachArrays
+from crowd_kernels.reach_space import ReachArrays
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 CHUNKS = 32
@@ -198,7 +198,7 @@ def reach_character(
         In and out: pelvis at leg scale 1, m.
     number : (44,) int32
         Scratch.
-    real : (68,) float64
+    real : (44,) float64
         Scratch.
     rows : (256,) float32
         Scratch.
@@ -236,7 +236,6 @@ def reach_character(
             state,
             number,
             real,
-            real[SCRATCH + MOST_SAMPLES :],
         )
         if state.stage[character, arm] != NONE:
             share, _ = course_shares(state.course[character, arm], limits.lead)
@@ -316,7 +315,7 @@ def reach_crowd(
         In and out.
     number : (32, 44) int32
         Scratch.
-    real : (32, 68) float64
+    real : (32, 44) float64
         Scratch.
     rows : (32, 256) float32
         Scratch.

@@ -21,6 +21,7 @@ from crowd_kernels.reach_goal import (
     advance_course,
     goal_of,
     quaternion_of,
+    set_vector,
     vector_of,
 )
 from crowd_kernels.reach_space import SCRATCH, ReachArrays, find_examples
@@ -33,6 +34,10 @@ SLOTS = 24
 """Most examples that are blended for one hand."""
 LEAST_WEIGHT = 1e-4
 """Weights that fade end here."""
+SAME_PLACE = 0.002
+"""A look-up serves places this close to its own, m; a twentieth of the spacing of pseudo-examples."""
+SAME_SHARE = 0.01
+"""Likewise for the share of the upper body's examples."""
 CHAIN = 9
 """Joints from pelvis to hand."""
 LOWER, UPPER, RIGHT_ARM, LEFT_ARM = 0, 1, 2, 3
@@ -154,9 +159,38 @@ def look_up(
 
 
 @inlined_kernel
-def add_wanted(
-    clip: int, weight: float, character: int, arm: int, state: ReachState, out_wanted: Any
-) -> None:
+def is_looked_up(
+    character: int, arm: int, wrist: Vector, pelvis: Vector, upper_share: float, state: ReachState
+) -> bool:
+    """Tell whether the last look-up serves, as nothing that it depends on has moved away from it.
+
+    Parameters
+    ----------
+    character, arm : int
+    wrist, pelvis : tuple of float
+        Root frame, m.
+    upper_share : float
+        0: the whole body reaches; 1: only the upper body.
+    state : ReachState
+    """
+    share = state.looked_up_share[character, arm]
+    if (upper_share <= 0.0) != (share <= 0.0) or (upper_share >= 1.0) != (share >= 1.0):
+        return False
+    if abs(upper_share - share) > SAME_SHARE:
+        return False
+    moved = subtract(wrist, vector_of(state.looked_up, character, arm))
+    if norm(moved) > SAME_PLACE:
+        return False
+    if upper_share <= 0.0:
+        return True
+    return (
+        norm(subtract(moved, subtract(pelvis, vector_of(state.looked_up_pelvis, character, arm))))
+        <= SAME_PLACE
+    )
+
+
+@inlined_kernel
+def add_wanted(clip: int, weight: float, character: int, arm: int, state: ReachState) -> None:
     """Add a weight that an example shall have to its slot, or to a free one; without any it is left out.
 
     Parameters
@@ -165,22 +199,68 @@ def add_wanted(
     weight : float
     character, arm : int
     state : ReachState
-        In and out: `example`.
-    out_wanted : (24,) float64
-        In and out.
+        In and out: `example`, `example_wanted`, `example_count`.
     """
-    free = -1
-    for slot in range(SLOTS):
-        is_used = state.example_weight[character, arm, slot] != 0.0 or out_wanted[slot] != 0.0
+    count = state.example_count[character, arm]
+    free = count
+    for slot in range(count):
+        is_used = (
+            state.example_weight[character, arm, slot] != 0.0
+            or state.example_wanted[character, arm, slot] != 0.0
+        )
         if is_used and state.example[character, arm, slot] == clip:
-            out_wanted[slot] += weight
+            state.example_wanted[character, arm, slot] += weight
             return
-        if not is_used and free < 0:
+        if not is_used and slot < free:
             free = slot
-    if free >= 0:
+    if free < SLOTS:
         state.example[character, arm, free] = clip
+        state.example_weight[character, arm, free] = 0.0
         state.example_weight_rate[character, arm, free] = 0.0
-        out_wanted[free] = weight
+        state.example_wanted[character, arm, free] = weight
+        state.example_count[character, arm] = max(count, free + 1)
+
+
+@inlined_kernel
+def look_up_examples(
+    character: int,
+    arm: int,
+    wrist: Vector,
+    pelvis: Vector,
+    size: float,
+    upper_share: float,
+    space: ReachArrays,
+    keys: ReachKeys,
+    state: ReachState,
+    number: Any,
+    real: Any,
+) -> None:
+    """Set the weights that one hand's examples come to, of both sets that are needed.
+
+    Parameters
+    ----------
+    character, arm : int
+    upper_share : float
+        0: the whole body reaches; 1: only the upper body.
+    state : ReachState
+        In and out: `example` and what belongs to it, `looked_up` likewise.
+
+    Notes
+    -----
+    All other arguments are those of `look_up`.
+    """
+    for slot in range(state.example_count[character, arm]):
+        state.example_wanted[character, arm, slot] = 0.0
+    for part in range(2):
+        share = upper_share if part == 1 else 1.0 - upper_share
+        if share <= 0.0:
+            continue
+        found = look_up(part, arm, wrist, pelvis, size, space, keys, number, real)
+        for sample in range(SCRATCH, SCRATCH + found):
+            add_wanted(number[sample], share * real[sample], character, arm, state)
+    set_vector(state.looked_up, character, arm, wrist)
+    set_vector(state.looked_up_pelvis, character, arm, pelvis)
+    state.looked_up_share[character, arm] = upper_share
 
 
 @inlined_kernel
@@ -197,7 +277,6 @@ def choose_examples(
     state: ReachState,
     number: Any,
     real: Any,
-    wanted: Any,
 ) -> None:
     """Let the weights of one hand's examples follow its goal, and advance its course at their pace.
 
@@ -208,8 +287,6 @@ def choose_examples(
     ----------
     upper_share : float
         0: the whole body reaches; 1: only the upper body.
-    wanted : (24,) float64
-        Scratch.
 
     Notes
     -----
@@ -225,43 +302,41 @@ def choose_examples(
         vector_of(state.point_hand, character, arm),
         size,
     )
-    wanted[:] = 0.0
     is_first = state.course[character, arm] <= 0.0
     if is_first:
-        for slot in range(SLOTS):
-            state.example_weight[character, arm, slot] = 0.0
-    for part in range(2):
-        share = upper_share if part == 1 else 1.0 - upper_share
-        if share <= 0.0:
-            continue
-        found = look_up(part, arm, wrist, pelvis, size, space, keys, number, real)
-        for sample in range(SCRATCH, SCRATCH + found):
-            add_wanted(number[sample], share * real[sample], character, arm, state, wanted)
+        state.example_count[character, arm] = 0
+    if is_first or not is_looked_up(character, arm, wrist, pelvis, upper_share, state):
+        look_up_examples(character, arm, wrist, pelvis, size, upper_share, space, keys, state, number, real)
     total = 0.0
     there = 0.0
     back = 0.0
-    for slot in range(SLOTS):
-        weight = wanted[slot]
+    count = 0
+    for slot in range(state.example_count[character, arm]):
+        wanted = state.example_wanted[character, arm, slot]
+        weight = wanted
         if weight == 0.0 and state.example_weight[character, arm, slot] == 0.0:
             continue
         if not is_first:
             weight, rate = ease(
                 state.example_weight[character, arm, slot],
                 state.example_weight_rate[character, arm, slot],
-                wanted[slot],
+                wanted,
                 limits.example_rate,
                 dt,
             )
             state.example_weight_rate[character, arm, slot] = rate
-            if wanted[slot] == 0.0 and weight < LEAST_WEIGHT:
+            if wanted == 0.0 and weight < LEAST_WEIGHT:
                 weight = 0.0
         weight = max(weight, 0.0)
         state.example_weight[character, arm, slot] = weight
+        if weight > 0.0 or wanted > 0.0:
+            count = slot + 1
         if weight > 0.0:
             clip = state.example[character, arm, slot]
             total += weight
             there += weight * keys.apex_time[clip]
             back += weight * (keys.end_time[clip] - keys.apex_time[clip])
+    state.example_count[character, arm] = count
     # Long limbs move more slowly (dynamic similarity).
     slowness = math.sqrt(size) / total
     time = state.seconds[character, arm]
@@ -333,7 +408,7 @@ def sum_examples(
     y = 0.0
     z = 0.0
     total = 0.0
-    for slot in range(SLOTS):
+    for slot in range(state.example_count[character, arm]):
         own = state.example_weight[character, arm, slot]
         clip = state.example[character, arm, slot]
         if own <= 0.0 or (clip >= keys.first_seated) != (part == 1):
@@ -367,7 +442,7 @@ def weight_of_part(
     """Find the summed weights of one hand's examples: those of a part, and all."""
     own = 0.0
     total = 0.0
-    for slot in range(SLOTS):
+    for slot in range(state.example_count[character, arm]):
         weight = state.example_weight[character, arm, slot]
         total += weight
         if (state.example[character, arm, slot] >= keys.first_seated) == (part == 1):

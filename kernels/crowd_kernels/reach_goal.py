@@ -91,6 +91,13 @@ class ReachState(NamedTuple):
     """(N, 2, 24) Examples that are blended; slots of weight 0 are free."""
     example_weight: npt.NDArray[np.float64]
     example_weight_rate: npt.NDArray[np.float64]
+    example_wanted: npt.NDArray[np.float64]
+    example_count: npt.NDArray[np.int32]
+    """(N, 2) Slots from here on are free."""
+    looked_up: npt.NDArray[np.float64]
+    """(N, 2, 3) Where the wrist was when examples were last looked up, root frame, m."""
+    looked_up_pelvis: npt.NDArray[np.float64]
+    looked_up_share: npt.NDArray[np.float64]
 
 
 @inlined_kernel
