@@ -13,6 +13,8 @@ TOO_FAR = 1
 TOO_CLOSE = 2
 DEGENERATE = 3
 TINY = 1e-12
+ALONG = 1e-6
+"""Sine of the angle to a bone up to which a hinge lies along it."""
 
 
 @kernel
@@ -28,7 +30,8 @@ def bend_rotations(
     target : tuple of float
         Where the end should be, m.
     hinge : tuple of float
-        Axis about which the limb bends when it is now straight; any length.
+        Axis about which the limb bends when it is now straight; any length. What of it lies across the limb
+        counts, and where nothing does, the limb bends anywhere.
     stretch : float
         Largest share of the limb's length that may be used, (0, 1].
 
@@ -69,10 +72,8 @@ def bend_rotations(
     sine = norm(axis)
     now = math.atan2(sine, dot(upper, lower))
     if not sine > 1e-6 * upper_length * lower_length:
-        axis = hinge
-        sine = norm(hinge)
-        if not sine > TINY:
-            return (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), DEGENERATE
+        axis = _across(upper, hinge)
+        sine = norm(axis)
     cosine = (distance * distance - upper_length * upper_length - lower_length * lower_length) / (
         2.0 * upper_length * lower_length
     )
@@ -81,6 +82,17 @@ def bend_rotations(
     second = (math.cos(half_turn), axis[0] * share, axis[1] * share, axis[2] * share)
     first = between(add(upper, rotate(second, lower)), way)
     return first, second, status
+
+
+@kernel
+def _across(bone: Vector, hinge: Vector) -> Vector:
+    """Find the part of a hinge that stands across a bone, or some vector that does."""
+    across = subtract(hinge, scaled(bone, dot(hinge, bone) / dot(bone, bone)))
+    if norm(across) > ALONG * norm(hinge):
+        return across
+    if abs(bone[0]) > abs(bone[2]):
+        return -bone[1], bone[0], 0.0
+    return 0.0, -bone[2], bone[1]
 
 
 @parallel_kernel

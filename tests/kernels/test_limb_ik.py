@@ -34,6 +34,21 @@ def test_reachable_targets_are_met_exactly_with_rigid_bones(rng):
     np.testing.assert_allclose(np.linalg.norm(end - middle, axis=1), LOWER, atol=1e-9)
 
 
+@pytest.mark.parametrize("pole", [(0.0, -1.0, 0.0), (0.3, -0.5, 0.7), (0.0, 1e-13, 0.0)])
+def test_straight_limbs_meet_targets_to_any_side(rng, pole):
+    side = np.array([[0.0, 0.0, 0.5], [0.0, 0.5, 0.0], [0.5, 0.0, 0.0], [0.0, -0.5, 0.0]])
+    target = np.concatenate([reachable_targets(rng), side])
+    root = np.zeros_like(target)
+    for axis in np.eye(3):
+        out = np.empty_like(target), np.empty_like(target), np.empty(len(target), np.int64)
+        poles = np.tile(pole, (len(target), 1))
+        crowd_two_bone_ik(root, root + UPPER * axis, root + (UPPER + LOWER) * axis, target, poles, *out)
+        middle, end, status = out
+        assert (status == REACHED).all()
+        np.testing.assert_allclose(end, target, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(middle, axis=1), UPPER, atol=1e-9)
+
+
 def test_the_middle_joint_stands_where_the_oracle_puts_it(rng):
     target, pole = reachable_targets(rng), rng.normal(size=(COUNT, 3))
     middle, _, _ = solve(target, pole)
