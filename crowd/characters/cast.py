@@ -21,7 +21,7 @@ BUILT_IN = "built-in"
 """What a scenario calls the engine's own body."""
 OWN_BODY = -1
 ENDINGS = (".glb", ".gltf")
-PURPOSE_CHARACTER = 105
+PURPOSE_CHARACTER = 106
 
 
 @dataclass(frozen=True)
