@@ -63,7 +63,7 @@ def qualities() -> dict[str, Quality]:
     from crowd_viewer import FAST, FINE
 
     never = float("inf")
-    limbs = replace(FAST, least_height=(never, never, never, FAST.least_height[3]), shadow_size=0)
+    limbs = replace(FAST, least_height=(never, never, never, *FAST.least_height[3:]), shadow_size=0)
     return {"limbs": limbs, "window": FAST, "best": FINE}
 
 

@@ -39,9 +39,9 @@ def test_a_skin_of_tubes_covers_the_pixels_of_the_limbs(drawing, walkers, close_
     from crowd_viewer.frame import source_of
 
     source, camera = source_of(walkers), close_camera[1]
-    heights = [1e9 if k < level else 0.0 for k in range(4)]
+    heights = [1e9 if k < level else 0.0 for k in range(5)]
     skins = replace(drawing.FINE, least_height=tuple(heights), shadow_size=0)
-    limbs = replace(drawing.FINE, least_height=(1e9, 1e9, 1e9, 0.0), shadow_size=0)
+    limbs = replace(drawing.FINE, least_height=(1e9, 1e9, 1e9, 0.0, 0.0), shadow_size=0)
     with renderer_of(source, skins, (tubes, tubes, tubes)) as renderer:
         seen, depth = renderer.identities(source.frame(), camera)
         counts = renderer.people.counts()
@@ -59,7 +59,7 @@ def test_skins_in_every_level_and_build_are_drawn_once(drawing, walkers, tubes):
     from crowd_viewer.frame import source_of
 
     source = source_of(walkers)
-    quality = replace(drawing.FINE, least_height=(60.0, 45.0, 35.0, 25.0))
+    quality = replace(drawing.FINE, least_height=(60.0, 45.0, 35.0, 25.0, 20.0))
     camera = drawing.Camera((0.0, 6.0, 22.0), (0.0, 0.5, 0.0))
     with renderer_of(source, quality, (tubes, tubes)) as renderer:
         seen, _ = renderer.identities(source.frame(), camera)
@@ -67,7 +67,7 @@ def test_skins_in_every_level_and_build_are_drawn_once(drawing, walkers, tubes):
         renderer.draw(source.frame(), camera, keeps_levels=False)
         picture = renderer.picture()
     assert min(counts) > 0
-    with renderer_of(source, replace(quality, least_height=(0.0,) * 4), (tubes, tubes)) as renderer:
+    with renderer_of(source, replace(quality, least_height=(0.0,) * 5), (tubes, tubes)) as renderer:
         expected, _ = renderer.identities(source.frame(), camera)
         assert renderer.people.counts()[0] == sum(counts)
     assert (seen != expected).mean() < 0.006
@@ -79,7 +79,7 @@ def test_no_more_skins_are_drawn_than_allowed(drawing, walkers, tubes):
     from crowd_viewer.frame import source_of
 
     source = source_of(walkers)
-    quality = replace(drawing.FINE, least_height=(0.5, 0.4, 0.3, 0.2), mesh_count=7)
+    quality = replace(drawing.FINE, least_height=(0.5, 0.4, 0.3, 0.2, 0.1), mesh_count=7)
     with renderer_of(source, quality, (tubes,)) as renderer:
         renderer.draw(source.frame(), drawing.Camera((0.0, 6.0, 22.0), (0.0, 0.5, 0.0)))
         counts = renderer.people.counts()
@@ -147,10 +147,31 @@ def test_levels_change_where_nobody_notices(drawing, walkers, close_camera, leve
     camera = drawing.Camera.around(place + [0.0, 0.9, 0.0], away, yaw + 0.5, 0.3)
     covered = []
     for chosen_level in (level, level + 1):
-        heights = tuple(1e9 if k < chosen_level else 0.0 for k in range(4))
+        heights = tuple(1e9 if k < chosen_level else 0.0 for k in range(5))
         with renderer_of(source, replace(drawing.FINE, least_height=heights)) as renderer:
             seen, _ = renderer.identities(source.frame(), camera)
         covered.append(seen > 0)
     fine, coarse = covered
     # The smaller people are, the larger is the share of their rims.
     assert (fine & coarse).sum() > (0.93, 0.90, 0.72, 0.64)[level] * (fine | coarse).sum()
+
+
+def test_strokes_have_the_colours_of_the_limbs_they_take_the_place_of(drawing, walkers):
+    from crowd_viewer.frame import source_of
+
+    source = source_of(walkers)
+    camera = drawing.Camera((0.0, 25.0, 50.0), (0.0, 0.5, 0.0))
+    pictures = []
+    for heights in ((1e9,) * 5, (1e9,) * 4 + (0.0,), (1e9,) * 3 + (0.0,) * 2):
+        quality = replace(drawing.FAST, least_height=heights, shadow_size=0)
+        with renderer_of(source, quality) as renderer:
+            renderer.draw(source.frame(), camera, keeps_levels=False)
+            pictures.append(renderer.picture().astype(float))
+            count = max(renderer.people.counts())
+    strokes, few, whole = pictures
+    assert count > 20
+    people = np.abs(few - np.median(few, axis=(0, 1))).max(axis=2) > 40
+    assert people.sum() > 100
+    # Between strokes and few limbs less may change than between few limbs and all of them.
+    assert block_difference(few, strokes)[0] < 1.2 * block_difference(whole, few)[0]
+    assert abs(block_difference(few, strokes)[1]) < 0.3

@@ -13,8 +13,7 @@ from crowd.errors import describe
 from crowd.motion.rotation import about, multiply, rotate
 from crowd_viewer.context import INSTALL, ViewerError
 from crowd_viewer.frame import CrowdFrame, Scene
-from crowd_viewer.people import PALETTE_UNIT, set_units
-from crowd_viewer.programs import compile_program
+from crowd_viewer.programs import PALETTE_UNIT, compile_program, set_units
 from crowd_viewer.quality import Quality
 from crowd_viewer.tables import Table
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from crowd_viewer.window import Window
 
 WIDTH = 250.0
-LEVEL_NAMES = ("fine", "middle", "coarse", "limbs", "far")
+LEVEL_NAMES = ("fine", "middle", "coarse", "limbs", "far", "tiny")
 
 
 def imgui_module() -> Any:

@@ -21,7 +21,15 @@ from crowd_viewer.bodies import (
     worn_where,
 )
 from crowd_viewer.frame import CrowdFrame, Scene
-from crowd_viewer.programs import MOST_JOINTS, compile_program
+from crowd_viewer.programs import (
+    LIMBS_UNIT,
+    LOOKS_UNIT,
+    MOST_JOINTS,
+    PALETTE_UNIT,
+    ROOTS_UNIT,
+    compile_program,
+    set_units,
+)
 from crowd_viewer.quality import Quality
 from crowd_viewer.tables import Table
 
@@ -30,10 +38,11 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 MESH_LEVELS = 3
-LEVELS = 5
+LEVELS = 6
 FEW_LIMBS = 13
 """Limbs of people who are far away: trunk, head, arms and legs."""
-PALETTE_UNIT, ROOTS_UNIT, LOOKS_UNIT, LIMBS_UNIT, SHADOW_UNIT = range(5)
+STROKES = 7
+"""Strokes of people who are tiny: each takes the place of two of those limbs, but for the head."""
 
 
 class People:
@@ -201,12 +210,18 @@ class People:
         self._bind()
         for bucket in range(MESH_LEVELS * self.build_count if self.has_meshes else 0):
             self._draw_meshes(kind, bucket)
-        near, far = (int(self._begin[k * self.build_count]) for k in (MESH_LEVELS, MESH_LEVELS + 1))
+        near, far, tiny, end = self._begin[MESH_LEVELS * self.build_count :: self.build_count].tolist()
         self._draw_capsules(kind, near, far - near, self._limb_count)
         if kind == "shadow" and not self.quality.has_far_shadows:
             return
-        kind = "far" if kind == "colour" else kind
-        self._draw_capsules(kind, far, int(self._begin[-1]) - far, min(FEW_LIMBS, self._limb_count))
+        few = min(FEW_LIMBS, self._limb_count)
+        if kind != "colour":
+            self._draw_capsules(kind, far, end - far, few)
+        elif few < FEW_LIMBS:
+            self._draw_capsules("far", far, end - far, few)
+        else:
+            self._draw_capsules("far", far, tiny - far, few)
+            self._draw_capsules("tiny", tiny, end - tiny, STROKES)
 
     def draw_blobs(self) -> None:
         """Darken the ground below the feet of all but those far away."""
@@ -237,10 +252,9 @@ class People:
             return
         program, quads = self._capsules[kind]
         self._set_rows(program, first, reduced=True)
-        program["limb_count"] = limb_count
         if "picked" in program:
             program["picked"] = self.picked
-        quads.render(self.context.TRIANGLE_STRIP, instances=count * limb_count)
+        quads.render(self.context.TRIANGLES, vertices=6 * limb_count, instances=count)
 
     def _set_rows(self, program: Any, first: int, *, reduced: bool) -> None:
         """Say where the people of a draw are in the tables."""
@@ -266,25 +280,7 @@ class People:
         constants: dict[str, Any] = {"LOOK_COLUMNS": LOOK_COLUMNS} | landmarks(self.scene.skeleton)
         corners = np.array([-1, -1, 1, -1, -1, 1, 1, 1], np.float32)
         self._corners = context.buffer(corners.tobytes())
-        self._capsules = {}
-        for kind, is_deep in (("colour", True), ("far", False), ("shadow", False), ("identity", True)):
-            kinds = {} if kind in ("colour", "far") else {kind.upper(): ""}
-            towards = "sun.xyz" if kind == "shadow" else "towards_eye(middle)"
-            deep = {"DEEP": ""} if is_deep else {}
-            program = compile_program(
-                context,
-                ("view.glsl", "people.glsl", "capsule.vert"),
-                ("view.glsl", "people.glsl", "lighting.glsl", "clothes.glsl", "capsule.frag"),
-                TOWARDS=towards,
-                SMALLEST_COVER="0.02" if self.quality.samples else "0.5",
-                PLAIN="",
-                **constants,
-                **kinds,
-                **deep,
-            )
-            set_units(program)
-            quads = context.vertex_array(program, [(self._corners, "2f4", "corner")])
-            self._capsules[kind] = (program, quads)
+        self._compile_limbs(constants)
         self._mesh_programs = {}
         for kind in ("colour", "shadow", "identity"):
             program = compile_program(
@@ -305,11 +301,50 @@ class People:
         set_units(self._blob_program)
         self._blobs = context.vertex_array(self._blob_program, [(self._corners, "2f4", "corner")])
 
+    def _compile_limbs(self, constants: dict[str, Any]) -> None:
+        """Compile the programs of capsules and strokes."""
+        context = self.context
+        # A person is one instance: drivers that draw on the processor pay for each, and fill their lanes so.
+        self._limb_count = max(len(body.limbs.joint) for body in self.bodies)
+        corners = context.buffer(self._corners.read() * self._limb_count)
+        firsts = 4 * np.arange(self._limb_count, dtype=np.int32)[:, None]
+        triangles = context.buffer((firsts + np.array([0, 1, 2, 2, 1, 3], np.int32)).tobytes())
+        programs = {}
+        for kind, is_deep in (("colour", True), ("far", False), ("shadow", False), ("identity", True)):
+            kinds = {} if kind in ("colour", "far") else {kind.upper(): ""}
+            towards = "sun.xyz" if kind == "shadow" else "towards_eye(middle)"
+            deep = {"DEEP": ""} if is_deep else {}
+            program = compile_program(
+                context,
+                ("view.glsl", "people.glsl", "capsule.vert"),
+                ("view.glsl", "people.glsl", "lighting.glsl", "clothes.glsl", "capsule.frag"),
+                TOWARDS=towards,
+                SMALLEST_COVER="0.02" if self.quality.samples else "0.5",
+                PLAIN="",
+                **constants,
+                **kinds,
+                **deep,
+            )
+            programs[kind] = program
+        programs["tiny"] = compile_program(
+            context,
+            ("view.glsl", "people.glsl", "lighting.glsl", "clothes.glsl", "stroke.vert"),
+            ("stroke.frag",),
+            STROKES=STROKES,
+            PIXEL="0.1",
+            PLAIN="",
+            **constants,
+        )
+        self._capsules = {}
+        for kind, program in programs.items():
+            set_units(program)
+            quads = context.vertex_array(program, [(corners, "2f4", "corner")], triangles)
+            self._capsules[kind] = (program, quads)
+
     def _fill_limbs(self) -> None:
         """Write what is worn where, then the limbs of all builds to a texture; missing ones have no size."""
         skeleton = self.scene.skeleton
         rest, part = rest_positions(skeleton), joint_parts(skeleton)
-        self._limb_count = max(len(body.limbs.joint) for body in self.bodies)
         table = np.zeros((self.build_count, self._limb_count + 1, 3, 4), np.float32)
         table[:, :, 0, 3] = 1e-6
         for row, body in zip(table, self.bodies, strict=True):
@@ -373,17 +408,3 @@ def vertex_bytes(skin: Skin) -> bytes:
     for _, _, name in VERTEX_LAYOUT:
         rows[name] = getattr(skin, name)
     return rows.tobytes()
-
-
-def set_units(program: Any) -> None:
-    """Tell a program where its textures are."""
-    units = {
-        "palette": PALETTE_UNIT,
-        "roots": ROOTS_UNIT,
-        "looks": LOOKS_UNIT,
-        "limbs": LIMBS_UNIT,
-        "shadow_map": SHADOW_UNIT,
-    }
-    for name, unit in units.items():
-        if name in program:
-            program[name] = unit

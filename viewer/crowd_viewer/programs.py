@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from crowd_viewer.context import ViewerError
 
@@ -15,6 +15,7 @@ ROWS = 2048
 """Rows of tables with a row for each person; further people are to the right of them."""
 MOST_JOINTS = 64
 VIEW_BINDING = 0
+PALETTE_UNIT, ROOTS_UNIT, LOOKS_UNIT, LIMBS_UNIT, SHADOW_UNIT = range(5)
 
 
 @cache
@@ -49,3 +50,17 @@ def compile_program(
     if "View" in program:
         program["View"].binding = VIEW_BINDING  # type: ignore[union-attr]
     return program
+
+
+def set_units(program: Any) -> None:
+    """Tell a program where its textures are."""
+    units = {
+        "palette": PALETTE_UNIT,
+        "roots": ROOTS_UNIT,
+        "looks": LOOKS_UNIT,
+        "limbs": LIMBS_UNIT,
+        "shadow_map": SHADOW_UNIT,
+    }
+    for name, unit in units.items():
+        if name in program:
+            program[name] = unit

@@ -12,8 +12,8 @@ class Quality:
     Attributes
     ----------
     least_height : tuple of float
-        Least height on the screen in pixels for the finest, middle and coarse mesh and for whole capsules;
-        smaller people get few capsules.
+        Least height on the screen in pixels for the finest, middle and coarse mesh, for whole and for few
+        capsules; smaller people get few strokes that are lit at their corners.
     mesh_count : int
         Most people drawn as meshes, the tallest on the screen first.
     samples : int
@@ -25,10 +25,10 @@ class Quality:
     shadow_reach : float
         Half of the side of the ground on which shadows fall where people are near, m.
     has_far_shadows : bool
-        People drawn with few capsules cast shadows too.
+        People drawn with few capsules or strokes cast shadows too.
     """
 
-    least_height: tuple[float, float, float, float]
+    least_height: tuple[float, float, float, float, float]
     mesh_count: int
     samples: int
     shadow_size: int
@@ -37,7 +37,7 @@ class Quality:
     has_far_shadows: bool
 
 
-FINE = Quality((150.0, 70.0, 34.0, 14.0), 2000, 4, 4096, 12, 45.0, True)
+FINE = Quality((150.0, 70.0, 34.0, 14.0, 5.0), 2000, 4, 4096, 12, 45.0, True)
 """For pictures, videos and graphics cards."""
-FAST = Quality((300.0, 170.0, 70.0, 34.0), 40, 0, 1024, 4, 25.0, False)
+FAST = Quality((300.0, 170.0, 70.0, 34.0, 20.0), 40, 0, 1024, 4, 25.0, False)
 """For windows where the processor draws."""

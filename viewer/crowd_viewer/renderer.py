@@ -15,8 +15,8 @@ from crowd_viewer.camera import Camera, view_planes
 from crowd_viewer.characters import Characters
 from crowd_viewer.frame import CrowdFrame, Scene
 from crowd_viewer.ground_map import GroundMap
-from crowd_viewer.people import SHADOW_UNIT, People
-from crowd_viewer.programs import VIEW_BINDING
+from crowd_viewer.people import People
+from crowd_viewer.programs import SHADOW_UNIT, VIEW_BINDING
 from crowd_viewer.quality import FINE, Quality
 from crowd_viewer.shadows import Light
 from crowd_viewer.surroundings import Surroundings

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd_viewer.frame import Scene
-from crowd_viewer.people import set_units
-from crowd_viewer.programs import compile_program
+from crowd_viewer.programs import compile_program, set_units
 
 if TYPE_CHECKING:
     import moderngl

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from crowd.world.mesh import Mesh
 from crowd.world.objects import Objects, ShapeKind
 from crowd_viewer.frame import CrowdFrame
-from crowd_viewer.people import set_units
-from crowd_viewer.programs import compile_program
+from crowd_viewer.programs import compile_program, set_units
 
 if TYPE_CHECKING:
     import moderngl

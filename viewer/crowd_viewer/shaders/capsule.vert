@@ -2,7 +2,6 @@
 in vec2 corner;
 uniform sampler2D limbs;   // a row a build: three texels, the first of where clothes end, then three a limb:
                            // start and radius, end and joint, rest and part
-uniform int limb_count;
 out vec2 across;
 out vec3 flat_place;
 flat out vec4 rotation;
@@ -17,8 +16,8 @@ flat out vec4 ends;
 flat out int slot;
 
 void main() {
-    int row = first + gl_InstanceID / limb_count;
-    int number = gl_InstanceID % limb_count;
+    int row = first + gl_InstanceID;
+    int number = gl_VertexID / 4;
     Root root = root_of(row);
     vec4 a = texelFetch(limbs, ivec2(3 * number + 3, root.build), 0);
     vec4 b = texelFetch(limbs, ivec2(3 * number + 4, root.build), 0);

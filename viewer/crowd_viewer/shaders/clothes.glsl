@@ -110,7 +110,11 @@ Material top_cloth(int slot, vec3 at, float pixel) {
 
 // `piece`: what it belongs to; `at` and `normal` in rest pose.
 Material clothes(int slot, int piece, vec3 at, vec3 normal) {
+#ifdef PIXEL
+    float pixel = PIXEL;
+#else
     float pixel = fwidth(at.y) + 1e-5;
+#endif
 #ifdef PLAIN
     if (piece == SKIN) return Material(look(slot, 0).rgb, 0.06);
     if (piece == HAIR) return Material(look(slot, 3).rgb * (0.87 + 0.25 * normal.y), 0.10);
