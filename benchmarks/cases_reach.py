@@ -121,5 +121,5 @@ def check_people(case: tuple[Reachers, npt.NDArray[np.float64]]) -> str | None:
 
 CASES = [
     Case("reach look-up", (1000, 10_000), set_up, run, check, peers={"scipy k-d tree": search}, bound_us=1.0),
-    Case("reach layer", (1000,), set_up_people, evaluate, check_people, bound_us=8.0),
+    Case("reach layer", (1000,), set_up_people, evaluate, check_people, bound_us=7.0),
 ]
