@@ -133,16 +133,16 @@ def _all_goals(scenario: Scenario) -> list[tuple[Location, Goal]]:
     return found
 
 
-def _task_points(scenario: Scenario) -> list[tuple[Location, Point]]:
-    """Ground points that tasks lead to."""
+def _task_points(scenario: Scenario, actions: tuple[str, ...]) -> list[tuple[Location, Point]]:
+    """Ground points of tasks with these actions."""
     found: list[tuple[Location, Point]] = []
     for key in ("characters", "regions", "flows"):
         for index, owner in enumerate(getattr(scenario, key)):
             for number, task in enumerate(owner.tasks):
-                for action in ("walk_to", "carry_to"):
+                for action in actions:
                     point = getattr(task, action)
                     if isinstance(point, tuple):
-                        found.append(((key, index, "tasks", number, action), point))
+                        found.append(((key, index, "tasks", number, action), (point[0], point[-1])))
     return found
 
 
@@ -152,7 +152,7 @@ def _check_goals(scenario: Scenario, problems: Problems) -> None:
     allowed = f"x {bounds.x[0]:g} to {bounds.x[1]:g}, z {bounds.z[0]:g} to {bounds.z[1]:g}"
     goals = _all_goals(scenario)
     pointed = [((*loc, "position"), goal.position) for loc, goal in goals if goal.position is not None]
-    pointed += _task_points(scenario)
+    pointed += _task_points(scenario, ("walk_to", "carry_to"))
     points = np.array([point for _, point in pointed]).reshape(-1, 2)
     is_outside, is_inside = ground.is_outside(points), ground.is_inside_obstacle(points)
     for (location, point), outside, inside in zip(pointed, is_outside, is_inside, strict=True):
@@ -160,6 +160,9 @@ def _check_goals(scenario: Scenario, problems: Problems) -> None:
             problems.add(location, "goal is outside the bounds", list(point), allowed)
         elif inside:
             problems.add(location, "goal is inside a wall", list(point), "a point on free ground")
+    for location, point in _task_points(scenario, ("put_down", "touch")):
+        if ground.is_outside(np.array([point]))[0]:
+            problems.add(location, "point is outside the bounds", list(point), allowed)
     for location, goal in goals:
         if goal.area is not None and not is_within(goal.area, bounds):
             problems.add((*location, "area"), "reaches outside the bounds", allowed=allowed)

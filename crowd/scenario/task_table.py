@@ -28,6 +28,7 @@ ALTERNATIVES = NAME, POINT = "a name", "a point"
 """What may stand for one key; they are parts of pydantic's locations, not of ours."""
 USES_A_HAND = frozenset({"pick_up", "put_down", "touch", "hand_over", "take_from"})
 USES_SECONDS = frozenset({"touch", "look_at"})
+DEFAULT_SECONDS = 1.0
 
 
 def _name_or(count: int) -> BeforeValidator:
@@ -88,7 +89,7 @@ class TaskTable(Table):
     """Play a clip of the motion library to its end."""
     hand: Literal["any", "right", "left", "both"] = "any"
     """Which hand does it."""
-    seconds: NotNegative = 1.0
+    seconds: NotNegative = DEFAULT_SECONDS
     """How long to touch or to look, s."""
 
     @property
@@ -101,8 +102,8 @@ class TaskTable(Table):
         given = [key for key in ACTIONS if getattr(self, key) is not None]
         if len(given) != 1:
             raise refuse("needs exactly one action", ", ".join(ACTIONS), got=" and ".join(given) or "none")
-        if "hand" in self.model_fields_set and given[0] not in USES_A_HAND:
+        if self.hand != "any" and given[0] not in USES_A_HAND:
             raise refuse(f"means nothing for {given[0]}", "no hand", "hand", self.hand)
-        if "seconds" in self.model_fields_set and given[0] not in USES_SECONDS:
+        if self.seconds != DEFAULT_SECONDS and given[0] not in USES_SECONDS:
             raise refuse(f"means nothing for {given[0]}", "touch or look_at", "seconds", self.seconds)
         return self

@@ -51,6 +51,7 @@ def test_names_stand_for_their_families():
         ('{ hand_over = "anne" }', "tasks[0].hand_over: nothing to hand over has this name; got 'anne'"),
         ("{ walk_to = [9.0, 0.0] }", "tasks[0].walk_to: goal is outside the bounds; got [9.0, 0.0]"),
         ("{ walk_to = [0.0, 2.3] }", "tasks[0].walk_to: goal is inside a wall; got [0.0, 2.3]"),
+        ("{ put_down = [0.0, 0.7, 9.0] }", "tasks[0].put_down: point is outside the bounds; got [0.0, 9.0]"),
         ("{ walk_to = 3 }", "tasks[0].walk_to: is neither a name nor a point; got 3"),
         ('{ walk_to = [1.0, "b"] }', "tasks[0].walk_to[1]: must be a number; got 'b'; allowed a number"),
         ("{ put_down = [0.0, 9.0, 1.0] }", "tasks[0].put_down[1]: is out of range; got 9.0; allowed <= 3"),
@@ -101,6 +102,12 @@ def test_a_person_without_anything_cannot_put_it_down(tmp_path):
     told = [(event.kind, event.task, event.detail) for event in simulation.events]
     assert told == [("task_failed", task, "the hands are empty") for task in ("put_down", "carry_to")]
     assert simulation.state.is_finished[0]
+
+
+def test_a_scenario_with_tasks_can_be_written_and_read_again():
+    scenario = crowd.load_scenario("seated_desk")
+    again = type(scenario).model_validate_json(scenario.model_dump_json())
+    assert again.characters == scenario.characters
 
 
 def test_kinds_of_tasks_are_the_actions_of_scenarios():
