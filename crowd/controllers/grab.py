@@ -13,6 +13,7 @@ from crowd.controllers.holding import Frames, Hands, Holding, composed
 from crowd.controllers.reach import Reach
 from crowd.joints import Joints
 from crowd.model import Model
+from crowd.motion.easing import smoother
 from crowd.motion.hand import hand_table
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
@@ -277,7 +278,7 @@ class Grab:
             rows,
             hands,
             np.ascontiguousarray(state.grab_style[rows, hands]),
-            _smooth(weight),
+            smoother(weight),
             state.finger_closure,
             state.pose_rotation,
         )
@@ -470,7 +471,7 @@ class Grab:
             return
         time = state.grab_time[hands] + dt
         state.grab_time[hands] = time
-        share = _smooth(np.minimum(time / self.settings.close_time, 1.0))
+        share = smoother(time / self.settings.close_time)
         limit = state.finger_limit[hands]
         state.finger_closure[hands] = np.minimum(limit, share[:, None]).astype(np.float32)
         done = (share[:, None] >= limit).all(axis=1)
@@ -485,8 +486,8 @@ class Grab:
         before = state.grab_time[hands]
         state.grab_time[hands] = before + dt
         length = self.settings.open_time
-        left = 1.0 - _smooth(np.minimum((before + dt) / length, 1.0))
-        had = 1.0 - _smooth(np.minimum(before / length, 1.0))
+        left = 1.0 - smoother((before + dt) / length)
+        had = 1.0 - smoother(before / length)
         share = left / np.maximum(had, 1e-9)
         state.finger_closure[hands] *= share[:, None].astype(np.float32)
         done = left <= 0.0
@@ -541,8 +542,3 @@ def _listed(
     hands = np.broadcast_to(np.asarray(hand, np.int32), rows.shape)
     items = np.broadcast_to(np.asarray(item, np.int32), rows.shape)
     return rows, np.ascontiguousarray(hands), np.ascontiguousarray(items)
-
-
-def _smooth(progress: FloatArray) -> FloatArray:
-    """Rise from 0 to 1 with continuous second derivative (Perlin 2002)."""
-    return np.asarray(progress**3 * (progress * (6.0 * progress - 15.0) + 10.0))

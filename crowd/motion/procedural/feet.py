@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from crowd.motion.body import ANKLE_HEIGHT, BALL_AHEAD, BALL_HEIGHT, STATURE, sole_points
 from crowd.motion.clip import TOE_ROLL
+from crowd.motion.easing import smoother
 from crowd.motion.procedural.shape import GaitShape
 from crowd.motion.rotation import about, multiply, rotate
 
@@ -49,12 +50,6 @@ class FootPath:
     pitch: FloatArray
     yaw: FloatArray
     toe_free: FloatArray
-
-
-def smoother(progress: FloatArray) -> FloatArray:
-    """Rise from 0 to 1 with zero velocity and acceleration at both ends; clamped."""
-    u = np.clip(progress, 0.0, 1.0)
-    return np.asarray(u**3 * (u * (6.0 * u - 15.0) + 10.0))
 
 
 def stance_pitch(shape: GaitShape, share: FloatArray) -> FloatArray:

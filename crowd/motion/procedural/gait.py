@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.motion.clip import TOE_ROLL, Clip, ClipKind, FootEvent
-from crowd.motion.procedural.feet import FootPath, RootPath, plan_foot, smoother, with_clearance
+from crowd.motion.easing import smoother
+from crowd.motion.procedural.feet import FootPath, RootPath, plan_foot, with_clearance
 from crowd.motion.procedural.legs import bend_leg, lower_pelvis
 from crowd.motion.procedural.shape import GaitShape
 from crowd.motion.procedural.upper_body import GRAVITY, move_pelvis, move_trunk, swing_arms

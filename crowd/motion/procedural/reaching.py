@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from crowd.motion.body import build_skeleton
 from crowd.motion.clip import Clip, ClipKind, ReachLabels
+from crowd.motion.easing import smoother
 from crowd.motion.mirror import mirrored
-from crowd.motion.procedural.feet import smoother
 from crowd.motion.procedural.gait import FRAME_RATE
 from crowd.motion.procedural.reach_pose import (
     COLUMN,

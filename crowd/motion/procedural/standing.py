@@ -8,7 +8,8 @@ import numpy.typing as npt
 
 from crowd.motion.body import ANKLE_HEIGHT, FINGERS, PELVIS_RISE, STATURE
 from crowd.motion.clip import Clip, ClipKind, JointMask
-from crowd.motion.procedural.feet import FootPath, smoother
+from crowd.motion.easing import smoother
+from crowd.motion.procedural.feet import FootPath
 from crowd.motion.procedural.gait import FRAME_RATE
 from crowd.motion.procedural.legs import bend_leg, lower_pelvis
 from crowd.motion.procedural.shape import GaitShape, standing_in_place

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.motion.body import FINGERS, PELVIS_RISE, STATURE
-from crowd.motion.procedural.feet import quintic, smoother
+from crowd.motion.easing import smoother
+from crowd.motion.procedural.feet import quintic
 from crowd.motion.procedural.shape import GaitShape
 from crowd.motion.rotation import about, multiply
 from crowd.motion.skeleton import Skeleton
