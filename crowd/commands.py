@@ -327,10 +327,22 @@ class Commands:
             Centre of the object, m.
         rotation_world : (4,) or (M, 4) array, optional
             Its rotation (w, x, y, z); as it is now when left out.
+
+        Raises
+        ------
+        SettingsError
+            A position is of the wrong shape or not finite.
         """
         rows, simulation = self._rows(characters), self._simulation
         state, objects = simulation.state, simulation.objects
-        place = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))
+        place = np.asarray(position_world, np.float64)
+        if place.shape not in ((3,), (rows.size, 3)):
+            raise SettingsError(
+                describe("put", "position has the wrong shape", place.shape, f"(3,) or ({rows.size}, 3)")
+            )
+        if not np.isfinite(place).all():
+            raise SettingsError(describe("put", "position is not finite", place.tolist(), "m"))
+        place = np.broadcast_to(place, (rows.size, 3))
         for side in range(len(HANDS)):
             items = np.maximum(state.grab_object[rows, side], 0)
             turn = objects.rotation_world[items] if objects.count else np.zeros((rows.size, 4))
@@ -446,6 +458,9 @@ class Commands:
         rows = np.atleast_1d(np.asarray(characters))
         if rows.dtype == np.bool_:
             rows = np.flatnonzero(rows)
+        if rows.size and not np.issubdtype(rows.dtype, np.integer):
+            allowed = f"whole numbers, 0 to {capacity - 1}"
+            raise SettingsError(describe("characters", "are no rows", str(characters), allowed))
         if rows.size and (rows.min() < 0 or rows.max() >= capacity):
             wrong = int(rows[(rows < 0) | (rows >= capacity)][0])
             raise SettingsError(describe("characters", "no such row", wrong, f"0 to {capacity - 1}"))

@@ -95,6 +95,16 @@ def test_programs_are_told_what_is_wrong(tmp_path):
         simulation.commands.do(0, [{"wait": 1.0}] * 8)
 
 
+def test_places_and_rows_that_are_none_are_refused(tmp_path):
+    simulation = load(tmp_path, "{ wait = 0.1 }")
+    with pytest.raises(SettingsError, match=r"put: position has the wrong shape; got \(2,\); allowed \(3,\)"):
+        simulation.commands.put(0, (1.0, 2.0))
+    with pytest.raises(SettingsError, match="put: position is not finite"):
+        simulation.commands.put(0, (float("nan"), 0.0, 0.0))
+    with pytest.raises(SettingsError, match="are no rows; got 'ann'; allowed whole numbers, 0 to 0"):
+        simulation.commands.put("ann", (1.0, 2.0, 0.0))
+
+
 def test_a_person_without_anything_cannot_put_it_down(tmp_path):
     simulation = load(tmp_path, '{ put_down = "table" }, { carry_to = [1.0, 1.0] }')
     for _ in simulation.run(seconds=0.2):
