@@ -224,9 +224,9 @@ CHECK_VALUES = {
 
 @pytest.mark.parametrize("name", CHECK_VALUES)
 def test_random_starts_equal_the_published_ones(shared_data: Path, name: str) -> None:
-    begin = time.perf_counter()
+    begin = time.process_time()
     people = place(load_scenario(shared_data / "steerbench" / f"{name}.xml"), seed=11)
-    assert time.perf_counter() - begin < 2.0
+    assert time.process_time() - begin < 2.0
     for row, (x, z, *direction) in CHECK_VALUES[name].items():
         assert people.position_world[row, [0, 2]] == pytest.approx((x, z), abs=1e-5)
         if direction:
