@@ -9,28 +9,35 @@ import numpy.typing as npt
 
 from crowd.controllers.controller import Step
 from crowd.errors import SettingsError, describe, nearest_first
-from crowd.joints import Joints
 from crowd.motion.joint_tree import joint_tree
-from crowd.motion.rotation import about, multiply, rotate
 from crowd.motion.skeleton import Segment, Skeleton
-from crowd.state import Float32Array, FloatArray, IntArray, State
+from crowd.state import ByteArray, Float32Array, IntArray, State
+from crowd_kernels.hold import aim_holds, apply_holds, hold_effectors
 from crowd_kernels.ik import (
     CHUNKS,
     POSITION,
     ROTATION_TOO,
     SETTINGS,
     SolveSettings,
+    TreeArrays,
     scratch_length,
     solve_crowd,
 )
-from crowd_kernels.reach_goal import NONE as NO_REACH
-from crowd_kernels.reach_goal import RETURN
+from crowd_kernels.reach_goal import HOLD
 
 EFFECTORS = ("right_hand", "left_hand", "head")
 """Joints that can be held, in the order of the state's effector axis: hands as everywhere, then the head."""
-ONE_STEP = SETTINGS._replace(pull=1.0, least_iterations=4, most_iterations=4, place_first=0)
-GONE = 1e-3
-"""Share below which a hold that fades has ended."""
+FOLLOWING = SETTINGS._replace(
+    damping=0.01,
+    pull=1.0,
+    place_first=0,
+    distance_tolerance=3e-4,
+    angle_tolerance=0.0044,
+    least_iterations=1,
+    most_iterations=4,
+)
+"""One iteration lets the pose follow; more are made where that leaves effectors beyond the tolerances."""
+ORIGIN: Float32Array = np.zeros(3, np.float32)
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ class ConstraintSettings:
         }
     )
     """How easily joints turn: arms give way before the trunk, which follows the other layers."""
-    solve: SolveSettings = ONE_STEP
+    solve: SolveSettings = FOLLOWING
     """One solve a step; it starts from the pose of the step before."""
 
 
@@ -78,16 +85,25 @@ class Constraint:
 
     def __init__(self, skeleton: Skeleton, capacity: int, settings: ConstraintSettings | None = None) -> None:
         self.settings = settings or ConstraintSettings()
-        self.tree = joint_tree(skeleton, EFFECTORS, weights=self.settings.weights)
-        self.joint = np.array([skeleton.joint(name) for name in EFFECTORS], np.int32)
-        self._joints = Joints(skeleton, capacity)
         count = len(EFFECTORS)
+        self.trees = {
+            mask: self._tree(skeleton, [e for e in range(count) if mask >> e & 1])
+            for mask in range(1, 1 << count)
+        }
+        """Trees of each set of effectors; bit e of the key is set for those with effector e."""
+        self.tree = self.trees[(1 << count) - 1]
         self._target: Float32Array = np.zeros((capacity, count, 3), np.float32)
         self._target_rotation: Float32Array = np.zeros((capacity, count, 4), np.float32)
         self._angle: Float32Array = np.zeros((capacity, count), np.float32)
         self._iterations = np.zeros(capacity, np.int32)
+        self._mask: ByteArray = np.zeros(capacity, np.uint8)
         length = scratch_length(len(self.tree.joint), count, len(Segment))
         self._scratch = np.zeros((CHUNKS, length), np.float32)
+
+    def _tree(self, skeleton: Skeleton, effectors: list[int]) -> TreeArrays:
+        """Build the tree of some effectors, which reads no joints but those of their chains."""
+        names = [EFFECTORS[e] for e in effectors]
+        return joint_tree(skeleton, names, weights=self.settings.weights, columns=effectors)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Hold nothing of people who have just entered."""
@@ -142,29 +158,35 @@ class Constraint:
         """Hold an effector where the pose of the layers so far has it; layers 5 and 6 call it every step."""
         if characters.size == 0:
             return
-        number = effector_number(effector)
-        self._joints.compute(step.state, step.model.people, characters)
-        place, rotation = self._effectors(step.state, characters, np.asarray(point, np.float64))
-        self.hold(step.state, characters, number, place[:, number], rotation[:, number], point)
+        stage = np.zeros((step.state.capacity, len(EFFECTORS)), np.uint8)
+        stage[characters, effector_number(effector)] = HOLD
+        self._hold_effectors(step, characters, stage, np.asarray(point, np.float32))
 
     def hold_reaches(self, step: Step) -> None:
         """Hold hands that go to a target or stay there where layers 5 and 6 have them now; let others go.
 
         Hands on their way back are followed still, so that the hold fades along their motion.
         """
+        self._hold_effectors(step, step.active, step.state.reach_stage, ORIGIN)
+
+    def _hold_effectors(self, step: Step, rows: IntArray, stage: ByteArray, point: Float32Array) -> None:
+        """Hold effectors where the pose has them now, by the stages of their reaches."""
         state = step.state
-        stage = state.reach_stage[step.active]
-        reaching = np.ascontiguousarray(step.active[(stage != NO_REACH).any(axis=1)])
-        if reaching.size == 0:
-            return
-        self._joints.compute(state, step.model.people, reaching)
-        place, rotation = self._effectors(state, reaching, np.zeros(3))
-        for hand in range(2):
-            stage = state.reach_stage[reaching, hand]
-            follows = stage != NO_REACH
-            rows = reaching[follows]
-            self.hold(state, rows, hand, place[follows, hand], rotation[follows, hand])
-            self.release(state, reaching[stage == RETURN], hand)
+        hold_effectors(
+            self.tree,
+            step.model.people.segment_scale,
+            state.pose_rotation,
+            state.pose_pelvis,
+            state.position_world,
+            state.yaw,
+            stage,
+            point,
+            rows,
+            state.constraint_task,
+            state.constraint_target_world,
+            state.constraint_target_rotation_world,
+            state.constraint_point,
+        )
 
     def release(self, state: State, characters: npt.ArrayLike, effector: str | int) -> None:
         """Let an effector go; it finds back softly."""
@@ -173,19 +195,43 @@ class Constraint:
 
     def evaluate(self, step: Step) -> None:
         """Bring held effectors back to where they are held."""
-        state = step.state
-        is_held = state.constraint_task[step.active] != 0
-        is_on = is_held | (state.constraint_weight[step.active] > 0.0)
-        rows = np.ascontiguousarray(step.active[is_on.any(axis=1)])
-        if rows.size == 0:
-            return
-        is_new = (state.constraint_weight[rows] == 0.0).all(axis=1)
-        state.constraint_rotation[rows[is_new]] = state.pose_rotation[rows[is_new]]
-        self._fade(state, rows, step.dt)
-        self._aim(step, rows)
-        self._keep_still_joints(state, rows)
-        solve_crowd(
+        state, people = step.state, step.model.people
+        aim_holds(
             self.tree,
+            self.settings.fade_rate,
+            step.dt,
+            people.segment_scale,
+            state.pose_rotation,
+            state.pose_pelvis,
+            state.position_world,
+            state.yaw,
+            state.constraint_task,
+            state.constraint_target_world,
+            state.constraint_target_rotation_world,
+            state.constraint_point,
+            step.active,
+            state.constraint_last_task,
+            state.constraint_weight,
+            state.constraint_weight_rate,
+            state.constraint_rotation,
+            self._target,
+            self._target_rotation,
+            state.constraint_status,
+            self._mask,
+        )
+        held = self._mask[step.active]
+        for mask, tree in self.trees.items():
+            rows = step.active[held == mask]
+            if rows.size:
+                self._solve(step, tree, rows)
+        if held.any():
+            apply_holds(self.tree, state.constraint_rotation, self._mask, step.active, state.pose_rotation)
+
+    def _solve(self, step: Step, tree: TreeArrays, rows: IntArray) -> None:
+        """Solve for people who hold the same effectors."""
+        state = step.state
+        solve_crowd(
+            tree,
             self.settings.solve,
             step.model.people.segment_scale,
             state.constraint_last_task,
@@ -203,62 +249,6 @@ class Constraint:
             self._angle,
             self._iterations,
         )
-        state.pose_rotation[rows] = state.constraint_rotation[rows]
-
-    def _fade(self, state: State, rows: IntArray, dt: float) -> None:
-        """Move the shares of holds to 1 or 0 as critically damped springs."""
-        rate = self.settings.fade_rate
-        goal = (state.constraint_task[rows] != 0).astype(np.float32)
-        away = state.constraint_weight[rows] - goal
-        speed = state.constraint_weight_rate[rows]
-        change = (speed + rate * away) * dt
-        decay = np.exp(-rate * dt)
-        weight = goal + (away + change) * decay
-        is_there = np.abs(weight - goal) < GONE
-        state.constraint_weight[rows] = np.where(is_there, goal, weight)
-        state.constraint_weight_rate[rows] = np.where(is_there, 0.0, (speed - rate * change) * decay)
-
-    def _aim(self, step: Step, rows: IntArray) -> None:
-        """Mix targets from where the incoming pose has the effectors and where they are held."""
-        state = step.state
-        self._joints.compute(state, step.model.people, rows)
-        place, rotation = self._effectors_model(rows, state.constraint_point[rows].astype(np.float64))
-        back = about(1, -state.yaw[rows])[:, None]
-        held = rotate(
-            np.broadcast_to(back, (*back.shape[:1], len(EFFECTORS), 4)),
-            state.constraint_target_world[rows] - state.position_world[rows, None],
-        )
-        turned = multiply(back, state.constraint_target_rotation_world[rows].astype(np.float64))
-        turned *= np.where((turned * rotation).sum(axis=2, keepdims=True) < 0.0, -1.0, 1.0)
-        weight = state.constraint_weight[rows][..., None].astype(np.float64)
-        asked, last = state.constraint_task[rows], state.constraint_last_task[rows]
-        task = np.where(weight[..., 0] > 0.0, np.where(asked != 0, asked, last), 0).astype(np.uint8)
-        state.constraint_last_task[rows] = task
-        self._target[rows] = place + weight * np.where(task[..., None] & POSITION, held - place, 0.0)
-        mixed = rotation + weight * np.where(task[..., None] & ROTATION_TOO, turned - rotation, 0.0)
-        self._target_rotation[rows] = mixed / np.linalg.norm(mixed, axis=2, keepdims=True)
-
-    def _keep_still_joints(self, state: State, rows: IntArray) -> None:
-        """Take the joints that the solve does not turn from the incoming pose."""
-        shape = (state.capacity, 4, -1)
-        incoming = state.pose_rotation.reshape(shape)
-        started = state.constraint_rotation.reshape(shape)
-        moved = self.tree.joint[self.tree.weight > 0]
-        kept: Float32Array = started[rows][:, :, moved]
-        started[rows] = incoming[rows]
-        started[rows[:, None, None], np.arange(4)[None, :, None], moved[None, None]] = kept
-
-    def _effectors_model(self, rows: IntArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Places (M, 3, 3) and rotations (M, 3, 4) of effectors in the root frame."""
-        rotation = self._joints.rotation_model[rows][:, self.joint].astype(np.float64)
-        place = self._joints.position_model[rows][:, self.joint].astype(np.float64)
-        return place + rotate(rotation, np.broadcast_to(point, place.shape)), rotation
-
-    def _effectors(self, state: State, rows: IntArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Places and rotations of effectors in world space."""
-        place, rotation = self._effectors_model(rows, point)
-        facing = np.broadcast_to(about(1, state.yaw[rows])[:, None], rotation.shape)
-        return rotate(facing, place) + state.position_world[rows, None], multiply(facing, rotation)
 
 
 class HandHolding:

@@ -31,6 +31,7 @@ def joint_tree(
     weights: Mapping[str, float] | None = None,
     root_weight: float = 0.0,
     is_limited: bool = True,
+    columns: Sequence[int] | None = None,
 ) -> TreeArrays:
     """Build the tree of joints above some effectors, for poses as `State.pose_rotation` holds them.
 
@@ -48,6 +49,8 @@ def joint_tree(
         How easily the pelvis moves, 0 for a pelvis that stays.
     is_limited : bool
         Keep the joints' limits.
+    columns : sequence of int, optional
+        Places of the effectors in the kernel's effector axis, when that holds more than these.
 
     Returns
     -------
@@ -93,6 +96,7 @@ def joint_tree(
         is_limited=has_limit[joints] * np.uint8(is_limited),
         **{name: np.ascontiguousarray(array[joints]) for name, array in limits._asdict().items()},
         effector=carrier,
+        column=np.array(range(len(effectors)) if columns is None else columns, np.int32),
         base=base,
         moves=moves,
         root_segment=int(Segment.LEG),

@@ -119,6 +119,8 @@ class TreeArrays(NamedTuple):
     """(K, 3)"""
     effector: npt.NDArray[np.int32]
     """(E,) Place in `joint` of the joint that carries each effector."""
+    column: npt.NDArray[np.int32]
+    """(E,) Column of each effector in the arrays of targets and results, which may hold more effectors."""
     base: npt.NDArray[np.int32]
     """(E,) Place in `joint` of the first joint of each effector's chain that can turn."""
     moves: npt.NDArray[np.uint8]
@@ -232,6 +234,7 @@ def plain_tree(
         is_limited=kept.astype(np.uint8),
         **(limits or no_limits(count))._asdict(),
         effector=carriers,
+        column=np.arange(len(carriers), dtype=np.int32),
         base=base,
         moves=moves,
         root_segment=0,
@@ -694,14 +697,15 @@ def gather_effectors(
     count = active.shape[0]
     parts = 1
     for e in range(tree.effector.shape[0]):
+        column = tree.column[e]
         row = out_effectors[e * EFFECTOR_ROW : (e + 1) * EFFECTOR_ROW]
         for lane in range(LANES):
             character = active[min(first + lane, count - 1)]
-            wants_place = (task[character, e] & POSITION) != 0
-            wants_frame = (task[character, e] & ROTATION_TOO) != 0
-            place = target_position[character, e]
-            frame = target_rotation[character, e]
-            if not is_sound(place, frame, point[character, e], wants_place, wants_frame):
+            wants_place = (task[character, column] & POSITION) != 0
+            wants_frame = (task[character, column] & ROTATION_TOO) != 0
+            place = target_position[character, column]
+            frame = target_rotation[character, column]
+            if not is_sound(place, frame, point[character, column], wants_place, wants_frame):
                 wants_place = False
                 wants_frame = False
             if wants_frame:
@@ -717,7 +721,7 @@ def gather_effectors(
             is_wanted = wants_place or wants_frame
             length: Any = 0.0
             for axis in range(3):
-                own = point[character, e, axis] if is_wanted else ZERO
+                own = point[character, column, axis] if is_wanted else ZERO
                 row[POINT + axis * LANES + lane] = own
                 length += own * own
                 row[TARGET + axis * LANES + lane] = place[axis] if wants_place else ZERO
@@ -896,12 +900,13 @@ def solve_chunk(
             character = active[first + lane]
             out_iterations[character] = int(iterations[lane])
             for e in range(effector_count):
+                column = tree.column[e]
                 effector = effectors[e * EFFECTOR_ROW : (e + 1) * EFFECTOR_ROW]
-                out_status[character, e] = status_of(
-                    int(task[character, e]), effector, lane, iterations[LANES + lane], settings
+                out_status[character, column] = status_of(
+                    int(task[character, column]), effector, lane, iterations[LANES + lane], settings
                 )
-                out_distance[character, e] = effector[DISTANCE + lane]
-                out_angle[character, e] = effector[ANGLE + lane]
+                out_distance[character, column] = effector[DISTANCE + lane]
+                out_angle[character, column] = effector[ANGLE + lane]
             pose = pose_rotation[character]
             for k in range(joint_count):
                 if tree.weight[k] > ZERO:
@@ -944,13 +949,13 @@ def solve_crowd(
     settings : SolveSettings
     segment_scale : (N, G) float32
         Proportions, about 1.
-    task : (N, E) uint8
-        What is asked of each effector: 0 nothing, 1 position, 2 rotation, 3 both.
-    point : (N, E, 3) float32
+    task : (N, >= E) uint8
+        What is asked of each effector, in its `tree.column`: 0 nothing, 1 position, 2 rotation, 3 both.
+    point : (N, >= E, 3) float32
         The effector in the frame of its joint, in the character's own size, m.
-    target_position : (N, E, 3) float32
+    target_position : (N, >= E, 3) float32
         Root frame, m.
-    target_rotation : (N, E, 4) float32
+    target_rotation : (N, >= E, 4) float32
         Rotation of the effector's joint in the root frame; nearly unit quaternions.
     reference_rotation : (N, L) float32
         Pose that is followed as far as the targets allow. May be `pose_rotation`.
@@ -964,12 +969,12 @@ def solve_crowd(
         In and out: the pose from which the solve starts, and the solution.
     root_position : (N, 3) float32
         In and out: the root at scale 1, m; changes only where `tree.root_weight` is above 0.
-    out_status : (N, E) uint8
+    out_status : (N, >= E) uint8
         0 nothing asked, 1 moving (iterations ended too early), 2 reached, 3 out of reach (the nearest point
         found), 4 refused (a target is not finite or no rotation).
-    out_distance : (N, E) float32
+    out_distance : (N, >= E) float32
         Distance to the target, or to the point of the chain's sphere nearest to it, m.
-    out_angle : (N, E) float32
+    out_angle : (N, >= E) float32
         Angle to the target's rotation, rad.
     out_iterations : (N,) int32
         Iterations made.
