@@ -48,7 +48,14 @@ REACH_LIMITS = ReachLimits(
     example_rate=22.0,
 )
 SOLVE = SETTINGS._replace(
-    reach=1e3, damping=0.03, distance_tolerance=1e-4, angle_tolerance=2e-3, most_iterations=40
+    # Solves start from their reference, near to which shortest steps stay by themselves; a pull would only
+    # push the hand off its target again in each iteration.
+    pull=0.0,
+    reach=1e3,
+    damping=0.03,
+    distance_tolerance=1e-4,
+    angle_tolerance=2e-3,
+    most_iterations=40,
 )
 EFFECTORS = ("right_hand", "left_hand")
 FEWEST_EXAMPLES = 8
