@@ -8,7 +8,7 @@ import numpy as np
 from crowd.controllers.controller import Step
 from crowd.controllers.grab import HOLDING, Grab
 from crowd.model import Model
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.rotation import about, multiply, rotate
 from crowd.state import BoolArray, IntArray, State
 from crowd_kernels.reach_goal import HOLD, MOVE
@@ -88,7 +88,7 @@ class Carrying:
             return
         progress = np.minimum(state.carry_progress[rows] + dt / self.settings.move_time, 1.0)
         state.carry_progress[rows] = progress
-        share = smoother(progress)
+        share = minimum_jerk(progress)
         heading = about(1, state.yaw[rows])
         goal = np.zeros((rows.size, 3))
         goal[:, 1] = self.settings.height * self._stature[rows]

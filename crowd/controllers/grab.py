@@ -13,7 +13,7 @@ from crowd.controllers.holding import Frames, Hands, Holding, composed
 from crowd.controllers.reach import Reach
 from crowd.joints import Joints
 from crowd.model import Model
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.hand import hand_table
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
@@ -278,7 +278,7 @@ class Grab:
             rows,
             hands,
             np.ascontiguousarray(state.grab_style[rows, hands]),
-            smoother(weight),
+            minimum_jerk(weight),
             state.finger_closure,
             state.pose_rotation,
         )
@@ -471,7 +471,7 @@ class Grab:
             return
         time = state.grab_time[hands] + dt
         state.grab_time[hands] = time
-        share = smoother(time / self.settings.close_time)
+        share = minimum_jerk(time / self.settings.close_time)
         limit = state.finger_limit[hands]
         state.finger_closure[hands] = np.minimum(limit, share[:, None]).astype(np.float32)
         done = (share[:, None] >= limit).all(axis=1)
@@ -486,8 +486,8 @@ class Grab:
         before = state.grab_time[hands]
         state.grab_time[hands] = before + dt
         length = self.settings.open_time
-        left = 1.0 - smoother((before + dt) / length)
-        had = 1.0 - smoother(before / length)
+        left = 1.0 - minimum_jerk((before + dt) / length)
+        had = 1.0 - minimum_jerk(before / length)
         share = left / np.maximum(had, 1e-9)
         state.finger_closure[hands] *= share[:, None].astype(np.float32)
         done = left <= 0.0

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from crowd.controllers.controller import KeySamples, Step
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.state import IntArray, State
 
 
@@ -67,6 +67,6 @@ class Sitting:
         samples.next_frame[sitting, 0] = table.first_key[clip] + key + 1
         samples.fraction[sitting, 0] = place - key
         samples.weight[sitting, 0] = 1.0
-        samples.layer_weight[sitting] = smoother(time / self.settings.ease)
+        samples.layer_weight[sitting] = minimum_jerk(time / self.settings.ease)
         samples.mask_index[sitting] = table.mask_index[clip]
         samples.blend_onto_pose(step, sitting)

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.locomotion import ease
 from crowd_kernels.random import uniform
 
@@ -44,12 +45,6 @@ def key_at(
     index = min(int(position), max(key_count - 2, 0))
     following = min(index + 1, key_count - 1)
     return first_key + index, first_key + following, position - index
-
-
-@kernel
-def smootherstep(progress: float) -> float:
-    """Rise from 0 to 1 with continuous second derivative; `progress` in [0, 1] (Perlin 2002)."""
-    return progress * progress * progress * (progress * (6.0 * progress - 15.0) + 10.0)
 
 
 @parallel_kernel
@@ -136,7 +131,7 @@ def idle_crowd(
                     idle_mix[character] = 0.0
                 dwell = uniform(seed, character, step, PURPOSE_IDLE_DWELL)
                 idle_until[character] = time + shortest_dwell + (longest_dwell - shortest_dwell) * dwell
-            weight = smootherstep(idle_mix[character])
+            weight = minimum_jerk(idle_mix[character])
             for sample in range(2):
                 idle_time[character, sample] += dt
                 clip = clips[idle_clip[character, sample]]

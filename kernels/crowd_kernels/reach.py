@@ -6,7 +6,7 @@ import numpy as np
 
 from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.layers import smootherstep
+from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.quaternion import (
     Quaternion,
     conjugate,
@@ -120,7 +120,7 @@ def aim_hand(
     goal = add(here, shortened(subtract(goal, here), farthest)) if course == APEX else goal
     target = goal
     late = 1.0
-    asked = smootherstep(state.rotation_share[character, arm])
+    asked = minimum_jerk(state.rotation_share[character, arm])
     out_task[character, arm] = 1
     if course != APEX:
         row[:] = ZERO
@@ -139,7 +139,7 @@ def aim_hand(
         miss = shortened(subtract(goal, add(apex, rotate(apex_turned, point))), farthest)
         target = add(here, scaled(miss, risen))
         # A trunk that is shared with the other hand does not do what was foreseen.
-        late = smootherstep(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * smootherstep(min(5.0 * other, 1.0))
+        late = minimum_jerk(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * minimum_jerk(min(5.0 * other, 1.0))
         target = add(target, scaled(subtract(goal, target), late))
         turn = rotation_vector(multiply(wanted, conjugate(apex_turned)))
         turned = multiply(from_rotation_vector(scaled(turn, risen * asked)), turned)

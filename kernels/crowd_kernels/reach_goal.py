@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
-from crowd_kernels.layers import smootherstep
+from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.quaternion import (
     Quaternion,
     conjugate,
@@ -464,7 +464,7 @@ def advance_course(
 def course_shares(course: float, lead: float) -> tuple[float, float]:
     """Find the share of the examples in the pose, and that of the correction of the hand, on a course."""
     side = course if course <= APEX else END - course
-    return smootherstep(min(side / lead, 1.0)), smootherstep(min(max(side, 0.0), 1.0))
+    return minimum_jerk(min(side / lead, 1.0)), minimum_jerk(min(max(side, 0.0), 1.0))
 
 
 @inlined_kernel

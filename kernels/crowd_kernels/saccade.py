@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.pose import joint_rotation, set_joint_rotation
 from crowd_kernels.quaternion import from_rotation_vector, multiply, normalized
 from crowd_kernels.random import normal, uniform
@@ -40,12 +41,6 @@ class SaccadeModes(NamedTuple):
     """(M, 2) Mean of the logarithm of the time on the target, and away from it."""
     interval_log_spread: npt.NDArray[np.float64]
     """(M, 2) Standard deviation of the same."""
-
-
-@kernel
-def minimum_jerk(progress: float) -> float:
-    """Rise from 0 to 1 with the least jerk; `progress` in [0, 1] (Flash and Hogan 1985)."""
-    return progress * progress * progress * (progress * (6.0 * progress - 15.0) + 10.0)
 
 
 @kernel

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crowd_kernels.layers import idle_crowd, key_at, play_crowd, smootherstep
+from crowd_kernels.easing import minimum_jerk
+from crowd_kernels.layers import idle_crowd, key_at, play_crowd
 from tests.oracles import layers as oracle
 
 DT = 1 / 60
@@ -33,13 +34,13 @@ def test_key_position_matches_oracle(time, key_count, key_rate, is_cyclic):
         assert following == frame + 1 or (is_cyclic and following == 7)
 
 
-def test_smootherstep_is_flat_at_its_ends():
+def test_minimum_jerk_is_flat_at_its_ends():
     step = 1e-4
-    assert smootherstep(0.0) == 0.0
-    assert smootherstep(1.0) == 1.0
-    assert smootherstep(step) < 1e-10
-    assert 1 - smootherstep(1 - step) < 1e-10
-    assert smootherstep(0.5) == pytest.approx(0.5)
+    assert minimum_jerk(0.0) == 0.0
+    assert minimum_jerk(1.0) == 1.0
+    assert minimum_jerk(step) < 1e-10
+    assert 1 - minimum_jerk(1 - step) < 1e-10
+    assert minimum_jerk(0.5) == pytest.approx(0.5)
 
 
 def run_idle(people=50, seconds=60.0, seed=3):

@@ -22,7 +22,7 @@ def settle(place, velocity, acceleration, time, dt):
     return curve(dt), curve.deriv()(dt), curve.deriv(2)(dt)
 
 
-def smootherstep(u):
+def minimum_jerk(u):
     u = np.clip(u, 0.0, 1.0)
     return u**3 * (u * (6 * u - 15) + 10)
 
@@ -66,7 +66,7 @@ def place_hand(keys, arm, scale, pelvis, rotation):
 def reach(keys, weights, arm, course, lead, goal, scale, live, live_pelvis):
     """Pose, pelvis at leg scale 1 and hand target of one standing person who reaches with one hand."""
     side = course if course <= 1 else 2 - course
-    share = smootherstep(side / lead)
+    share = minimum_jerk(side / lead)
     example, example_pelvis = blend(keys, weights, course)
     pose = mix(live, example, np.full((len(live), 1), share))
     pelvis = (1 - share) * live_pelvis + share * example_pelvis
@@ -74,5 +74,5 @@ def reach(keys, weights, arm, course, lead, goal, scale, live, live_pelvis):
     here, _ = place_hand(keys, arm, scale, leg * pelvis, pose)
     apex, apex_pelvis = blend(keys, weights, 1.0)
     there, _ = place_hand(keys, arm, scale, leg * apex_pelvis, apex)
-    target = goal if course == 1 else here + smootherstep(side) * (goal - there)
+    target = goal if course == 1 else here + minimum_jerk(side) * (goal - there)
     return pose, pelvis, target

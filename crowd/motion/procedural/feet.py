@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from crowd.motion.body import ANKLE_HEIGHT, BALL_AHEAD, BALL_HEIGHT, STATURE, sole_points
 from crowd.motion.clip import TOE_ROLL
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.procedural.shape import GaitShape
 from crowd.motion.rotation import about, multiply, rotate
 
@@ -54,7 +54,9 @@ class FootPath:
 
 def stance_pitch(shape: GaitShape, share: FloatArray) -> FloatArray:
     """Rise of the toes over a stance, negative once the heel rises, rad; `share` since the strike."""
-    strike = shape.strike_pitch * (1.0 - smoother(share / shape.flat)) if shape.flat > 0.0 else 0.0 * share
+    strike = (
+        shape.strike_pitch * (1.0 - minimum_jerk(share / shape.flat)) if shape.flat > 0.0 else 0.0 * share
+    )
     progress = np.clip((share - shape.heel_off) / (shape.stance - shape.heel_off), 0.0, None)
     return np.asarray(strike - shape.toe_off_pitch * progress ** (1.0 + shape.rise_power))
 
@@ -178,7 +180,7 @@ def plan_foot(
     swing = quintic(progress, (before[0], leaving, leaving_bend, after[0], landing, landing_bend))
     distance = np.hypot(after[0][:, 0] - before[0][:, 0], after[0][:, 2] - before[0][:, 2])
     turned = np.abs(after[0][:, 4] - before[0][:, 4])
-    moves = smoother((distance + 0.2 * turned) / 0.05) if shape.lift > 0.025 else np.ones(len(time))
+    moves = minimum_jerk((distance + 0.2 * turned) / 0.05) if shape.lift > 0.025 else np.ones(len(time))
     swing[:, 1] += shape.lift * moves * lift_curve(progress[:, 0])
     path = np.where((share > shape.stance)[:, None], swing, here)
     return FootPath(path[:, :3], path[:, 3], path[:, 4], np.maximum(share - shape.stance, 0.0))

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.motion.clip import TOE_ROLL, Clip, ClipKind, FootEvent
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.procedural.feet import FootPath, RootPath, plan_foot, with_clearance
 from crowd.motion.procedural.legs import bend_leg, lower_pelvis
 from crowd.motion.procedural.shape import GaitShape
@@ -121,7 +121,7 @@ def changing_clip(
     time = first + np.arange(round(length * FRAME_RATE) + 1) / FRAME_RATE
 
     def share(t: FloatArray) -> FloatArray:
-        risen = smoother((t - first) / length)
+        risen = minimum_jerk((t - first) / length)
         return risen if starts else 1.0 - risen
 
     fine = first + np.linspace(-2.0 * cycle, length + 2.0 * cycle, 4000)

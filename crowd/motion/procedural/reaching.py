@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from crowd.motion.body import build_skeleton
 from crowd.motion.clip import Clip, ClipKind, ReachLabels
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.mirror import mirrored
 from crowd.motion.procedural.gait import FRAME_RATE
 from crowd.motion.procedural.reach_pose import (
@@ -111,10 +111,10 @@ def clip(body: Body, name: str, apex: FloatArray) -> Clip:
     count = round(intervals / APEX_SHARE)
     frame = np.arange(count + 1)
     progress = np.where(frame <= intervals, frame / intervals, (count - frame) / (count - intervals))
-    risen = smoother(progress)[:, None]
+    risen = minimum_jerk(progress)[:, None]
     numbers = rest + risen * (apex - rest)
     for column in (COLUMN["neck_yaw"], COLUMN["neck_pitch"]):
-        early = smoother(progress / GAZE_LEAD)
+        early = minimum_jerk(progress / GAZE_LEAD)
         numbers[:, column] = rest[column] + early * (apex[column] - rest[column])
     on_the_way = 64.0 * (progress * (1.0 - progress)) ** 3
     swing = np.hypot(apex[COLUMN["arm_swing_x"]], apex[COLUMN["arm_swing_z"]])

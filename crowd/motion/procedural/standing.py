@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from crowd.motion.body import ANKLE_HEIGHT, FINGERS, PELVIS_RISE, STATURE
 from crowd.motion.clip import Clip, ClipKind, JointMask
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.procedural.feet import FootPath
 from crowd.motion.procedural.gait import FRAME_RATE
 from crowd.motion.procedural.legs import bend_leg, lower_pelvis
@@ -82,7 +82,9 @@ class Stance:
 
     def bump(self, begin: float, end: float, ease: float = 0.7) -> FloatArray:
         """Rise from 0 to 1 at a time and fall back at another, s."""
-        return np.asarray(smoother((self.time - begin) / ease) * (1.0 - smoother((self.time - end) / ease)))
+        return np.asarray(
+            minimum_jerk((self.time - begin) / ease) * (1.0 - minimum_jerk((self.time - end) / ease))
+        )
 
 
 def build_stance(skeleton: Skeleton, shape: GaitShape, stance: Stance) -> tuple[FloatArray, FloatArray]:
@@ -314,9 +316,9 @@ def carry_left(stance: Stance) -> None:
 
 def sit_down(stance: Stance) -> None:
     """Lean ahead, sink onto a seat 0.45 m high, and sit upright with the hands on the thighs."""
-    down = smoother((stance.time - 0.15) / 1.15)
-    lean = smoother(stance.time / 0.8) * (1.0 - smoother((stance.time - 0.75) / 0.75))
-    stance.back += SEAT_BEHIND * smoother((stance.time - 0.10) / 1.05)
+    down = minimum_jerk((stance.time - 0.15) / 1.15)
+    lean = minimum_jerk(stance.time / 0.8) * (1.0 - minimum_jerk((stance.time - 0.75) / 0.75))
+    stance.back += SEAT_BEHIND * minimum_jerk((stance.time - 0.10) / 1.05)
     standing = standing_in_place().pelvis_height + PELVIS_RISE * STATURE + STANDING_RISE
     stance.sink += (standing - SEATED_PELVIS) * down
     stance.lean += 0.85 * lean

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.motion.body import FINGERS, PELVIS_RISE, STATURE
-from crowd.motion.easing import smoother
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.procedural.feet import quintic
 from crowd.motion.procedural.shape import GaitShape
 from crowd.motion.rotation import about, multiply
@@ -123,7 +123,7 @@ def swing_arms(
     for side, sign in (("left", 1.0), ("right", -1.0)):
         ahead = sign * np.cos(2.0 * np.pi * (phase - ARM_LAG))
         flexion = shape.arm_forward + effort * shape.arm_swing * ahead
-        elbow = shape.elbow + effort * shape.elbow_swing * smoother(0.5 + 0.5 * ahead)
+        elbow = shape.elbow + effort * shape.elbow_swing * minimum_jerk(0.5 + 0.5 * ahead)
         pose_arm(skeleton, side, flexion, shape.arm_out * np.ones_like(phase), elbow, out, inward=0.12)
         curl_fingers(skeleton, side, 1.0 if not shape.is_running else 2.0, out)
 
