@@ -12,6 +12,10 @@ from crowd_kernels.random import uniform
 FloatArray = npt.NDArray[np.float64]
 
 PURPOSE_TEMPO = 201
+SHOULDER_HEIGHT, SHOULDER_SIDE = 0.82, 0.10
+"""Of somebody who stands, over stature."""
+SEATED_SHOULDER_HEIGHT, SEATED_SHOULDER_BEHIND = 0.575, 0.20
+"""Of somebody who sits, over stature; behind the feet."""
 
 
 @dataclass(frozen=True)
@@ -63,3 +67,37 @@ class People:
         personal = np.array([uniform(seed, character, 0, PURPOSE_TEMPO) for character in range(count)])
         tempo = (0.97 + 0.06 * personal) / np.sqrt(stride_scale)
         return cls(radius, preferred_speed, stature, segment_scale, stride_scale, tempo)
+
+
+def shoulders_world(
+    position_world: FloatArray,
+    yaw: npt.ArrayLike,
+    stature: npt.ArrayLike,
+    hand: npt.ArrayLike,
+    is_seated: npt.ArrayLike = False,
+) -> FloatArray:
+    """Where shoulders are of people who stand or sit upright.
+
+    Parameters
+    ----------
+    position_world : (M, 3) float64
+        On the ground, m.
+    yaw : (M,) float64
+        rad.
+    stature : float or (M,) float64
+        m.
+    hand : int or (M,) int
+        0 right, 1 left, 2 the middle between both.
+    is_seated : bool or (M,) bool
+
+    Returns
+    -------
+    (M, 3) float64
+        m.
+    """
+    side = np.array([-SHOULDER_SIDE, SHOULDER_SIDE, 0.0])[np.asarray(hand)] * stature
+    behind = np.where(is_seated, SEATED_SHOULDER_BEHIND, 0.0) * stature
+    height = np.where(is_seated, SEATED_SHOULDER_HEIGHT, SHOULDER_HEIGHT) * stature
+    sine, cosine = np.sin(yaw), np.cos(yaw)
+    away = [cosine * side - sine * behind, height, -sine * side - cosine * behind]
+    return np.asarray(position_world + np.stack(np.broadcast_arrays(*away), axis=-1))

@@ -35,7 +35,7 @@ from crowd.navigation.navigator import Navigator, avoidance_settings
 from crowd.population import Population
 from crowd.scenario import Scenario
 from crowd.state import Float32Array, FloatArray, IntArray, State
-from crowd.tasks import Events, Tasks
+from crowd.tasks import Events, Refusals, Tasks
 from crowd.world.objects import ObjectState
 from crowd_kernels import _jit
 
@@ -119,7 +119,7 @@ class Simulation:
         self.locomotion = Locomotion(capacity)
         self.animation = Animation(capacity)
         people = self.model.people
-        self.reach = Reach(self.model.library, people.segment_scale, people.stature)
+        self.reach = Reach(self.model.library, people.segment_scale, people.stature, self.model.world)
         self.joints = Joints(self.model.skeleton, capacity)
         self.grab = Grab(self.model, self.objects, self.joints, self.reach)
         self.carrying = Carrying(self.model, self.grab)
@@ -142,6 +142,7 @@ class Simulation:
         self.foot_lock = FootLock(self.model.skeleton, capacity=capacity, dt=self.dt)
         self.commands = Commands(self)
         self.tasks = Tasks(self)
+        self.refusals = Refusals(self)
         self.metrics = Metrics()
         self.stage_seconds = dict.fromkeys(STAGES, 0.0)
         layers = (*self.controllers, self.constraint)
@@ -263,7 +264,8 @@ class Simulation:
         self.grab.settle(step)
 
     def _record(self, step: Step, frame: Frame) -> None:
-        """Hand the frame to metrics."""
+        """Tell of refused targets, hand the frame to metrics."""
+        self.refusals.tell(step.time)
         self.metrics.observe(self)
 
     # ---- what a program reads
@@ -290,6 +292,7 @@ class Simulation:
             ("foot_lock", self.foot_lock),
             ("objects", self.objects),
             ("tasks", self.tasks),
+            ("refusals", self.refusals),
             *self.navigator.parts(),
         )
 

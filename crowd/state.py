@@ -174,6 +174,8 @@ class State:
     """Stage of each hand's reach, right and left: 0 none, 1 move, 2 hold, 3 return. (character, 2)"""
     reach_status: ByteArray = _array(2, dtype=np.uint8)
     """0 none, 1 moving, 2 reached, 3 out of reach (as near as can be), 4 refused target. (character, 2)"""
+    reach_is_blocked: BoolArray = _array(2, dtype=np.bool_)
+    """A wall lies between the shoulder and the last target that was asked for. (character, 2)"""
     reach_target_world: FloatArray = _array(2, 3)
     """Where a point of the hand shall come, m; may change in every step. (character, 2, 3)"""
     reach_target_rotation_world: FloatArray = _array(2, 4)

@@ -103,6 +103,6 @@ class Carrying:
             place, wanted = self._grab.holding.hand_targets(hands, items, position, rotation)
             state.carry_target_world[rows, hand] = place
             if begins.any():
-                self._grab.reach.start(state, rows[begins], hand, place[begins], wanted[begins])
+                self._grab.reach.start(state, rows[begins], hand, place[begins], wanted[begins], is_own=True)
             state.reach_target_world[rows, hand] = place
             state.reach_target_rotation_world[rows, hand] = wanted

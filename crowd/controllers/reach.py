@@ -17,7 +17,9 @@ from crowd.motion.library import MotionLibrary
 from crowd.motion.mirror import mirrored, opposite
 from crowd.motion.procedural.reaching import seated_reaches, standing_reaches
 from crowd.motion.skeleton import Segment, Skeleton
+from crowd.people import shoulders_world
 from crowd.state import FloatArray, IntArray, State
+from crowd.world import World
 from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
 from crowd_kernels.reach import CHUNKS, reach_crowd
 from crowd_kernels.reach_blend import ROW
@@ -79,17 +81,23 @@ class ReachSettings:
 class Reach:
     """Moves hands to targets, holds them there and brings them back."""
 
-    state_fields: ClassVar[tuple[str, ...]] = tuple(f"reach_{name}" for name in ReachState._fields)
+    state_fields: ClassVar[tuple[str, ...]] = (
+        "reach_is_blocked",
+        *(f"reach_{name}" for name in ReachState._fields),
+    )
 
     def __init__(
         self,
         library: MotionLibrary,
         segment_scale: npt.NDArray[np.float32],
         stature: FloatArray,
+        world: World,
         settings: ReachSettings | None = None,
     ) -> None:
         self.settings = settings or ReachSettings()
         self._library = library
+        self._stature = stature
+        self._world = world
         self._segment_scale = segment_scale
         self._size = np.ascontiguousarray(stature / library.skeleton.stature)
         self._space: ReachSpace | None = None
@@ -131,8 +139,11 @@ class Reach:
         point_hand: npt.ArrayLike | None = None,
         seconds: float | None = None,
         hold: float | None = None,
+        is_own: bool = False,
     ) -> None:
         """Reach for targets; a hand that is on its way or holds goes there without returning.
+
+        Refused are targets that are not finite or lie behind walls; the layer refuses those in the body.
 
         Parameters
         ----------
@@ -151,6 +162,8 @@ class Reach:
             Time to the target, s; as people do when left out.
         hold : float, optional
             Time at the target before the hand returns, s; until `end` when left out.
+        is_own : bool
+            The targets move with the body, so that no wall comes between.
         """
         hands = np.broadcast_to(np.asarray(hand), len(characters))
         state.reach_target_world[characters, hands] = position_world
@@ -160,6 +173,9 @@ class Reach:
         state.reach_point_hand[characters, hands] = 0.0 if point_hand is None else point_hand
         state.reach_hold_left[characters, hands] = np.inf if hold is None else hold
         state.reach_seconds[characters, hands] = 0.0 if seconds is None else seconds
+        state.reach_is_blocked[characters, hands] = False
+        if not is_own:
+            self._refuse_blocked(state, characters, hands)
         place = state.reach_target_world[characters, hands]
         is_finite = np.isfinite(place).all(axis=1)
         is_new = state.reach_stage[characters, hands] == NONE
@@ -192,6 +208,19 @@ class Reach:
                 [c * w - s * y, c * x + s * z, c * y + s * w, c * z - s * x], axis=1
             )
 
+    def _refuse_blocked(self, state: State, characters: IntArray, hands: npt.NDArray[np.intp]) -> None:
+        """Take away targets that lie behind walls."""
+        shoulder = shoulders_world(
+            state.position_world[characters],
+            state.yaw[characters],
+            self._stature[characters],
+            hands,
+            state.is_seated[characters],
+        )
+        is_blocked = self._world.is_blocked(shoulder, state.reach_target_world[characters, hands])
+        state.reach_is_blocked[characters, hands] = is_blocked
+        state.reach_target_world[characters[is_blocked], hands[is_blocked]] = np.nan
+
     def move(
         self,
         state: State,
@@ -220,6 +249,7 @@ class Reach:
         reaching = step.active[(stage != NONE).any(axis=1)]
         if reaching.size == 0:
             return
+        begins = (state.reach_stage == MOVE) & (state.reach_course == 0.0)
         parts = ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields))
         reach_crowd(
             self.space.arrays,
@@ -264,6 +294,10 @@ class Reach:
             self._iterations,
         )
         self._report(state, reaching, step.dt, parts)
+        refused = begins & (state.reach_status == REFUSED)
+        state.reach_stage[refused] = NONE
+        for name in ("course", "course_rate", "weight"):
+            getattr(state, f"reach_{name}")[refused] = 0.0
 
     def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:
         """Tell how the reaches stand."""

@@ -24,6 +24,10 @@ class TimedObstacles:
         self._timed = timed
         self._present: dict[int, int] = {}
 
+    def changes_after(self, time: float) -> bool:
+        """Whether something comes or goes after a time, s."""
+        return any(timed.appear_at > time or time < timed.disappear_at < math.inf for timed in self._timed)
+
     def update(self, world: World, time: float) -> bool:
         """Add and remove what `time` (s) asks for; returns whether the world changed."""
         changed = False
@@ -42,7 +46,9 @@ def obstacle_shapes(obstacle: TimedObstacle) -> list[shapes.Shape]:
     """Shapes of one obstacle of a scenario."""
     match obstacle:
         case Box():
-            return [shapes.Box(*obstacle.x, *obstacle.z, height=obstacle.height)]
+            return [
+                shapes.Box(*obstacle.x, *obstacle.z, height=obstacle.height, has_boards=bool(obstacle.boards))
+            ]
         case Polygon():
             return [shapes.Polygon(obstacle.points, height=obstacle.height)]
         case Wall():

@@ -2,5 +2,6 @@
 
 from crowd.tasks.events import Event, EventKind, Events
 from crowd.tasks.execution import Tasks
+from crowd.tasks.refusals import Refusals
 
-__all__ = ["Event", "EventKind", "Events", "Tasks"]
+__all__ = ["Event", "EventKind", "Events", "Refusals", "Tasks"]

@@ -9,10 +9,11 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from crowd.state import FloatArray, IntArray
 from crowd.tasks.present_task import free_hand, held_object, holding_hand, task_of, wanted_hand
-from crowd.tasks.standing_place import find_standing_place
+from crowd.tasks.standing_place import find_standing_place, is_behind_walls
 from crowd.tasks.task_list import Hand, Target, TaskKind
 from crowd.tasks.waits import Outcome
 from crowd.world.furniture import Furniture
@@ -28,6 +29,8 @@ SEATED_SIDE = 1.1
 """Angle to a side within which they do, rad."""
 MEETING_DISTANCE = 0.95
 """Distance of two people who hand something over, m."""
+CHEST = 0.7
+"""Height over stature at which no wall may be between them."""
 SPOT_GAP = 0.16
 """Least distance between things on a board, m."""
 NEIGHBORHOOD = 3.0
@@ -47,10 +50,9 @@ def choose_walk(tasks: Tasks, row: int, time: float) -> Outcome:
     tasks.target_world[row] = point
     radius = float(simulation.model.radius[row])
     if kind is Target.FURNITURE:
-        piece = _nearest_furniture(tasks, row, target)
-        tasks.target_world[row] = piece.spots()[0]
         tasks.hand[row] = Hand.RIGHT
-        return Outcome.NEXT if _take_place(tasks, row) else Outcome.FAIL
+        spots = _nearest_furniture(tasks, row, target).spots()
+        return _take_first_place(tasks, row, spots[_nearest(tasks, row, spots)])
     place = simulation.model.world.nearest_walkable(point[None].copy(), radius)[0]
     if np.isnan(place).any():
         return Outcome.FAIL
@@ -66,19 +68,20 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     items = np.array(tasks.names.groups[group])
     objects = simulation.objects
     is_free = (objects.holder[items] < 0) & ((tasks.claimed_by[items] < 0) | (tasks.claimed_by[items] == row))
+    has_taken = not is_free.all()
     items = items[is_free & ~np.isin(items, _delivered(tasks))]
     away = np.linalg.norm(objects.position_world[items] - simulation.state.position_world[row], axis=1)
     tasks.hand[row] = free_hand(tasks, row)
     is_high = objects.position_world[items, 1] > HIGHEST * simulation.model.people.stature[row]
     nearest = items[np.lexsort((away, is_high))][:MOST_CONSIDERED]
     # What could not be taken from one place may be taken from another; so may its neighbour.
-    for item in np.roll(nearest, -((int(tasks.attempt[row]) + 1) // 2)):
-        tasks.target_world[row] = objects.position_world[item]
-        if _take_place(tasks, row):
-            tasks.object[row] = item
-            tasks.claimed_by[item] = row
-            return Outcome.NEXT
-    return Outcome.FAIL
+    nearest = np.roll(nearest, -((int(tasks.attempt[row]) + 1) // 2))
+    outcome = _take_first_place(tasks, row, objects.position_world[nearest])
+    if outcome is Outcome.NEXT:
+        item = nearest[(objects.position_world[nearest] == tasks.target_world[row]).all(axis=1)][0]
+        tasks.object[row] = item
+        tasks.claimed_by[item] = row
+    return Outcome.FAIL if outcome is Outcome.BEHIND_WALLS and has_taken else outcome
 
 
 def _delivered(tasks: Tasks) -> IntArray:
@@ -98,8 +101,7 @@ def choose_touch(tasks: Tasks, row: int, time: float) -> Outcome:
         nearest = int(np.argmin(np.linalg.norm(position - simulation.state.position_world[row], axis=1)))
         tasks.object[row] = items[nearest]
         point = position[nearest]
-    tasks.target_world[row] = point
-    return Outcome.NEXT if _take_place(tasks, row) else Outcome.FAIL
+    return _take_first_place(tasks, row, point[None])
 
 
 def choose_spot(tasks: Tasks, row: int, time: float) -> Outcome:
@@ -113,14 +115,8 @@ def choose_spot(tasks: Tasks, row: int, time: float) -> Outcome:
     kind, group, point = task_of(tasks, row)
     rotation = simulation.model.objects.start_rotation_world[item]
     lift = np.array([0.0, -simulation.model.objects.lowest_point(item, rotation), 0.0])
-    if kind is Target.POINT:
-        tasks.target_world[row] = point + lift
-        return Outcome.NEXT if _take_place(tasks, row) else Outcome.FAIL
-    for spot in _free_spots(tasks, row, group):
-        tasks.target_world[row] = spot + lift
-        if _take_place(tasks, row):
-            return Outcome.NEXT
-    return Outcome.FAIL
+    places = point[None] if kind is Target.POINT else _free_spots(tasks, row, group)
+    return _take_first_place(tasks, row, places + lift)
 
 
 def _nearest_furniture(tasks: Tasks, row: int, group: int) -> Furniture:
@@ -129,8 +125,14 @@ def _nearest_furniture(tasks: Tasks, row: int, group: int) -> Furniture:
     return min(pieces, key=lambda piece: float(np.linalg.norm(piece.center - here)))
 
 
-def _free_spots(tasks: Tasks, row: int, group: int) -> list[FloatArray]:
-    """Free places on the furniture of a name, the nearest to the person first, at most ten."""
+def _nearest(tasks: Tasks, row: int, points_world: FloatArray) -> npt.NDArray[np.intp]:
+    """Rows of the points nearest to the person, the nearest first, at most ten."""
+    away = np.linalg.norm(points_world - tasks.simulation.state.position_world[row], axis=1)
+    return np.argsort(away, kind="stable")[:MOST_CONSIDERED]
+
+
+def _free_spots(tasks: Tasks, row: int, group: int) -> FloatArray:
+    """Free places on the furniture of a name, the nearest to the person first, at most ten. (P, 3)"""
     simulation = tasks.simulation
     spots = np.concatenate([simulation.model.furniture[i].spots() for i in tasks.names.groups[group]])
     objects = simulation.objects
@@ -144,8 +146,7 @@ def _free_spots(tasks: Tasks, row: int, group: int) -> list[FloatArray]:
     if len(taken):
         away = np.linalg.norm(spots[:, None, [0, 2]] - taken[None, :, [0, 2]], axis=2)
         spots = spots[(away > SPOT_GAP).all(axis=1)]
-    order = np.argsort(np.linalg.norm(spots - simulation.state.position_world[row], axis=1), kind="stable")
-    return list(spots[order[:MOST_CONSIDERED]])
+    return np.asarray(spots[_nearest(tasks, row, spots)])
 
 
 def choose_seat(tasks: Tasks, row: int, time: float) -> Outcome:
@@ -194,7 +195,12 @@ def choose_taker(tasks: Tasks, row: int, time: float) -> Outcome:
     places = state.position_world[other] + MEETING_DISTANCE * np.stack(
         [np.sin(yaw), np.zeros_like(yaw), np.cos(yaw)], axis=1
     )
-    fits = simulation.model.world.is_walkable(places, float(simulation.model.radius[row]))
+    world = simulation.model.world
+    fits = world.is_walkable(places, float(simulation.model.radius[row]))
+    chest = [0.0, CHEST * float(simulation.model.people.stature[other]), 0.0]
+    fits &= ~world.is_blocked(
+        places + chest, np.broadcast_to(state.position_world[other] + chest, places.shape)
+    )
     if not fits.any():
         return Outcome.FAIL
     chosen = places[int(np.flatnonzero(fits)[0])]
@@ -240,28 +246,39 @@ def _is_in_seated_reach(tasks: Tasks, row: int, target_world: FloatArray) -> boo
     return math.hypot(way[0], way[2]) < SEATED_REACH and abs(angle) < SEATED_SIDE
 
 
-def _take_place(tasks: Tasks, row: int) -> bool:
+def _take_first_place(tasks: Tasks, row: int, targets_world: FloatArray) -> Outcome:
+    """Choose where to stand for the first of the targets (P, 3) for which there is a place."""
+    met = set()
+    for target in targets_world:
+        tasks.target_world[row] = target
+        outcome = _take_place(tasks, row)
+        if outcome is Outcome.NEXT:
+            return outcome
+        met.add(outcome)
+    return Outcome.BEHIND_WALLS if met == {Outcome.BEHIND_WALLS} else Outcome.FAIL
+
+
+def _take_place(tasks: Tasks, row: int) -> Outcome:
     """Choose where to stand for the target; seated people who reach it stay where they are."""
     simulation = tasks.simulation
     state, model = simulation.state, simulation.model
     if _is_in_seated_reach(tasks, row, tasks.target_world[row]):
         tasks.has_place[row] = False
-        return True
-    place = find_standing_place(
+        return Outcome.NEXT
+    asked = (
         model.world,
         tasks.target_world[row],
         state.position_world[row],
         float(model.people.stature[row]),
         float(model.radius[row]),
         int(tasks.hand[row]),
-        _taken_places(tasks, row),
-        int(tasks.attempt[row]),
     )
+    place = find_standing_place(*asked, _taken_places(tasks, row), int(tasks.attempt[row]))
     if place is None:
-        return False
+        return Outcome.BEHIND_WALLS if is_behind_walls(*asked) else Outcome.FAIL
     tasks.place_world[row], tasks.place_yaw[row] = place.position_world, place.yaw
     tasks.has_place[row] = True
-    return True
+    return Outcome.NEXT
 
 
 def _taken_places(tasks: Tasks, row: int) -> list[tuple[FloatArray, float]]:

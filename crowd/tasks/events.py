@@ -17,6 +17,8 @@ class EventKind(StrEnum):
     TASK_RETRIED = "task_retried"
     OBJECT_TAKEN = "object_taken"
     OBJECT_PUT_DOWN = "object_put_down"
+    TARGET_REFUSED = "target_refused"
+    """A hand or the gaze was sent to what it cannot go to."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,10 @@ class Event:
     character : int
     kind : EventKind
     task : str
-        The task's action, such as ``"pick_up"``.
+        The task's action, such as ``"pick_up"``; of refused targets that no task asked for the layer:
+        ``"reach"``, ``"grab"`` or ``"gaze"``.
     detail : str
-        The object's name, or why a task failed.
+        The object's name, or why a task failed or a target was refused.
     """
 
     time: float

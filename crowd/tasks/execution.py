@@ -32,6 +32,11 @@ MOST_WAITS = 120
 """Times that a person looks for a free object, seat or place before the task fails."""
 LOOK_AGAIN_AFTER = 1.0
 """Time between two of these, s."""
+HOPELESS = {
+    Outcome.EMPTY_HANDED: "the hands are empty",
+    Outcome.BEHIND_WALLS: "obstacles are in the way from every place to stand",
+}
+"""Why tasks fail without another look."""
 RESTING = 255
 """Value of `move` of a person who rests before the next try."""
 
@@ -193,11 +198,13 @@ class Tasks:
                 self.since[row] = time
                 self.until[row] = time + move.limit(self, row)
                 return
-            if outcome is Outcome.FAIL:
+            may_change = self.simulation.model.timetable.changes_after(time)
+            if outcome is Outcome.FAIL or (outcome is Outcome.BEHIND_WALLS and may_change):
                 self._look_again(row, time)
                 return
-            if outcome is Outcome.EMPTY_HANDED:
-                self._give_up(row, time, "the hands are empty")
+            if outcome in HOPELESS:
+                let_go_of_everything(self, row)
+                self._give_up(row, time, HOPELESS[outcome])
                 return
 
     def _time_out(self, row: int, time: float) -> None:
@@ -221,7 +228,7 @@ class Tasks:
         let_go_of_everything(self, row)
         self.attempt[row] += 1
         if self.attempt[row] < MOST_ATTEMPTS:
-            self.events.add(time, row, EventKind.TASK_RETRIED, self._task(row), why)
+            self.events.add(time, row, EventKind.TASK_RETRIED, self.present(row), why)
             self._rest(row, time + RETRY_AFTER)
         else:
             self._give_up(row, time, why)
@@ -232,16 +239,16 @@ class Tasks:
         self.until[row] = until
 
     def _give_up(self, row: int, time: float, why: str) -> None:
-        self.events.add(time, row, EventKind.TASK_FAILED, self._task(row), why)
+        self.events.add(time, row, EventKind.TASK_FAILED, self.present(row), why)
         self.failed[row] += 1
         self._next(row)
 
-    def _task(self, row: int) -> str:
+    def present(self, row: int) -> str:
         """Action of a person's present task."""
         return TaskKind(int(self.lists.kind[row, self.index[row]])).name.lower()
 
     def _finish(self, row: int, time: float) -> None:
-        self.events.add(time, row, EventKind.TASK_DONE, self._task(row))
+        self.events.add(time, row, EventKind.TASK_DONE, self.present(row))
         self.done[row] += 1
         self._next(row)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 
+from crowd.people import shoulders_world
 from crowd.world import World
 
 FloatArray = npt.NDArray[np.float64]
@@ -15,12 +15,12 @@ FloatArray = npt.NDArray[np.float64]
 DISTANCES = (0.46, 0.54, 0.38, 0.62, 0.70, 0.30, 0.78)
 """Ground distances from the target in the order of preference, at a stature of `STATURE`, m."""
 DIRECTIONS = 24
+BOTH = 2
 STATURE = 1.75
 ASIDE = 0.30
 """How far to the side of the hand the target is seen from the place, rad."""
 GAP = 0.03
 """Least gap between people who stand, m."""
-TOUCHING = 1e-6
 NEARNESS_WEIGHT = 3.0
 """How much way a person takes for a better distance, m of way per m."""
 
@@ -72,17 +72,12 @@ def find_standing_place(
     **Differs from the source:** the place is chosen among obstacles and people instead of on the straight
     line to the target.
     """
-    angle = 2.0 * math.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    length = np.array(DISTANCES) * stature / STATURE
-    steps = np.stack([np.sin(angle), np.zeros(DIRECTIONS), np.cos(angle)], axis=1)
-    ground = np.array([target_world[0], 0.0, target_world[2]])
-    points = (ground + length[:, None, None] * steps).reshape(-1, 3)
-    rank = np.repeat(np.abs(length - length[0]), DIRECTIONS)
+    points, yaw, rank = _places_around(target_world, stature, hand)
     fits = world.is_walkable(points, radius)
     for place, other in taken:
         away = points - place
         fits &= np.hypot(away[:, 0], away[:, 2]) > radius + other + GAP
-    fits &= _sees(world, points, ground)
+    fits &= _is_free_for_arms(world, points, yaw, stature, hand, target_world)
     candidates = np.flatnonzero(fits)
     if candidates.size:
         starts = np.repeat(start_world[None], candidates.size, axis=0)
@@ -91,22 +86,35 @@ def find_standing_place(
         return None
     way = np.linalg.norm(points[candidates] - start_world, axis=1)
     order = np.argsort(way + NEARNESS_WEIGHT * rank[candidates], kind="stable")
-    chosen = points[candidates[order[min(attempt * 5, candidates.size - 1)]]]
-    towards = ground - chosen
-    side = (ASIDE, -ASIDE, 0.0)[hand]
-    return StandingPlace(chosen, math.atan2(towards[0], towards[2]) + side)
+    chosen = candidates[order[min(attempt * 5, candidates.size - 1)]]
+    return StandingPlace(points[chosen], float(yaw[chosen]))
 
 
-def _sees(world: World, points: FloatArray, ground: FloatArray) -> npt.NDArray[np.bool_]:
-    """From which points no obstacle lies between, other than the one that the target is on."""
-    seen = np.ones(len(points), np.bool_)
-    if not world.obstacles:
-        return seen
-    target = shapely.Point(ground[0], ground[2])
-    lines = shapely.linestrings(
-        np.stack([points[:, [0, 2]], np.broadcast_to(ground[[0, 2]], (len(points), 2))], axis=1)
-    )
-    asked, found = world.tree.query(lines, predicate="intersects")
-    stands_between = shapely.distance(world.tree.geometries[found], target) > TOUCHING
-    seen[asked[stands_between]] = False
-    return seen
+def is_behind_walls(
+    world: World, target_world: FloatArray, start_world: FloatArray, stature: float, radius: float, hand: int
+) -> bool:
+    """Whether obstacles keep a person from every place where the hand would reach; arguments as above."""
+    return find_standing_place(world, target_world, start_world, stature, radius, hand, ()) is None
+
+
+def _places_around(
+    target_world: FloatArray, stature: float, hand: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Places (P, 3) around a target, headings there (P,), and how far each is from the best distance (P,)."""
+    angle = 2.0 * math.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    length = np.array(DISTANCES) * stature / STATURE
+    steps = np.stack([np.sin(angle), np.zeros(DIRECTIONS), np.cos(angle)], axis=1)
+    points = (target_world * [1.0, 0.0, 1.0] + length[:, None, None] * steps).reshape(-1, 3)
+    yaw = np.tile(angle - math.pi + (ASIDE, -ASIDE, 0.0)[hand], len(length))
+    return points, yaw, np.repeat(np.abs(length - length[0]), DIRECTIONS)
+
+
+def _is_free_for_arms(
+    world: World, points: FloatArray, yaw: FloatArray, stature: float, hand: int, target_world: FloatArray
+) -> npt.NDArray[np.bool_]:
+    """At which places no obstacle is between the shoulders of the arms that reach and the target."""
+    targets = np.broadcast_to(target_world, points.shape)
+    free = np.ones(len(points), np.bool_)
+    for side in (0, 1) if hand == BOTH else (hand,):
+        free &= ~world.is_blocked(shoulders_world(points, yaw, stature, side), targets)
+    return free

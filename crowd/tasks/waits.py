@@ -37,6 +37,8 @@ class Outcome(Enum):
     """Nothing suitable is there now; worth another look."""
     EMPTY_HANDED = 3
     """There is nothing in the hands to do it with."""
+    BEHIND_WALLS = 4
+    """Obstacles keep the hands away from it, wherever one stands."""
 
 
 class Wait(IntEnum):

@@ -22,6 +22,8 @@ class Box:
     zmin: float
     zmax: float
     height: float = 2.5
+    has_boards: bool = False
+    """What lies in it can be reached from outside, as in a shelf."""
 
     def outline(self) -> FloatArray:
         """Corners in order, (4, 2)."""

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import shapely
 
 from crowd.world.grid import Bounds, Grid, Layout, cover_ground
-from crowd.world.obstacles import Shape, Wall
+from crowd.world.obstacles import Box, Shape, Wall
 from crowd.world.walls import Walls
 
 FloatArray = npt.NDArray[np.float64]
@@ -19,6 +19,10 @@ BoolArray = npt.NDArray[np.bool_]
 CELL_SIZE = 0.25
 RADIUS_STEP = 0.05
 """Bodies share a grid with others whose radius rounds up to the same multiple of this, m."""
+TOUCHING = 1e-6
+"""Distances below this are none, m."""
+TOUCH_DEPTH = 0.02
+"""Ways of arms end this much before their targets, m: what is on a wall is not behind it."""
 MOST_CHANGES = 256
 """Changes that the world remembers."""
 
@@ -151,6 +155,38 @@ class World:
         is_reachable: BoolArray = is_known & (grid.component[starts] == grid.component[goals])
         return is_reachable
 
+    def is_blocked(self, start_world: FloatArray, end_world: FloatArray) -> BoolArray:
+        """Between which pairs of points an arm would go through an obstacle, below its height.
+
+        Parameters
+        ----------
+        start_world, end_world : (P, 3) float64
+            Shoulder and target, m. What touches an obstacle at its near side is free, and so is what lies in
+            a box with boards. Pairs that are not finite are not blocked.
+
+        Returns
+        -------
+        (P,) bool
+        """
+        blocked = np.zeros(len(end_world), np.bool_)
+        way = end_world - start_world
+        known = np.flatnonzero(np.isfinite(way).all(axis=1))
+        if not self._obstacles or known.size == 0:
+            return blocked
+        length = np.linalg.norm(way[known], axis=1, keepdims=True)
+        way = way[known] * (1.0 - np.minimum(TOUCH_DEPTH / np.maximum(length, TOUCH_DEPTH), 1.0))
+        start = start_world[known]
+        lines = shapely.linestrings(np.stack([start, start + way], axis=1)[:, :, [0, 2]])
+        asked, found = self.tree.query(lines, predicate="intersects")
+        geometry = self.tree.geometries[found]
+        lowest = _lowest_inside(start[asked], way[asked], shapely.intersection(lines[asked], geometry))
+        height = np.array([shape.height for shape in self._obstacles.values()])[found]
+        has_boards = np.array([isinstance(s, Box) and s.has_boards for s in self._obstacles.values()])[found]
+        targets = shapely.points(end_world[known][asked][:, [0, 2]])
+        is_in_shelf = has_boards & (shapely.distance(geometry, targets) < TOUCHING)
+        blocked[known[asked[(lowest < height - TOUCHING) & ~is_in_shelf]]] = True
+        return blocked
+
     def _change(self, shape: Shape, *, is_gone: bool) -> None:
         """Update everything that depends on an obstacle that has come or gone."""
         self._list_obstacles()
@@ -179,6 +215,18 @@ class World:
             polygons=self._solids(),
             segments=[shape.outline() for shape in shapes if isinstance(shape, Wall)],
         )
+
+
+def _lowest_inside(start_world: FloatArray, way: FloatArray, inside: npt.NDArray[np.object_]) -> FloatArray:
+    """Lowest height of straight ways (P, 3) over their parts inside obstacles, m. (P,)"""
+    corners, pair = shapely.get_coordinates(inside, return_index=True)
+    flat = np.maximum((way[:, [0, 2]] ** 2).sum(axis=1), TOUCHING**2)
+    share = ((corners - start_world[pair][:, [0, 2]]) * way[pair][:, [0, 2]]).sum(axis=1) / flat[pair]
+    # What goes straight up or down is inside as a whole.
+    is_steep = flat <= TOUCHING**2
+    lowest = np.where(is_steep, start_world[:, 1] + np.minimum(way[:, 1], 0.0), np.inf)
+    np.minimum.at(lowest, pair, start_world[pair, 1] + way[pair, 1] * share)
+    return lowest
 
 
 def radius_class(radius: float) -> int:

@@ -4,6 +4,9 @@ import time
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from crowd.navigation.routing import Routing
 from crowd.world import World
@@ -135,3 +138,63 @@ def test_a_large_world_is_built_quickly(rng):
     begin = time.process_time()
     World((-100, 100, -100, 100), boxes).grid(0.5)
     assert time.process_time() - begin < 2.0, "about 0.1 s on a free core"
+
+
+def is_blocked_by_samples(shapes, start, end):
+    """Slow twin of `World.is_blocked`: points along the way, to 2 cm before its end."""
+    way = end - start
+    share = max(1.0 - 0.02 / max(np.linalg.norm(way), 0.02), 0.0)
+    steps = start + np.linspace(0.0, share, 4001)[:, None] * way
+    blocked = np.zeros(len(steps), np.bool_)
+    for shape in shapes:
+        ground = shape.geometry()
+        if getattr(shape, "has_boards", False) and ground.covers(shapely.Point(end[[0, 2]])):
+            continue
+        blocked |= shapely.intersects_xy(ground, steps[:, 0], steps[:, 2]) & (steps[:, 1] < shape.height)
+    return bool(blocked.any())
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_arms_are_blocked_where_points_of_their_way_are_inside(seed):
+    rng = np.random.default_rng(seed)
+    shapes = []
+    for _ in range(rng.integers(1, 4)):
+        x, z, wide, deep = *rng.uniform(-1, 0.6, 2), *rng.uniform(0.1, 0.8, 2)
+        height, has_boards = rng.uniform(0.3, 2.0), bool(rng.random() < 0.4)
+        shapes.append(Box(x, x + wide, z, z + deep, height, has_boards))
+    corners = rng.uniform(0.2, 0.8) * np.array([[0, -1], [1, 1], [-1, 1], [0, 0.2]])[:, [1, 0]]
+    shapes.append(Polygon([tuple(map(float, corner)) for corner in corners[[0, 1, 3, 2]]], 1.0))
+    start = rng.uniform((-1.5, 1.0, -1.5), (1.5, 1.6, 1.5), (20, 3))
+    end = rng.uniform((-1.5, 0.0, -1.5), (1.5, 1.9, 1.5), (20, 3))
+    end[-1] = start[-1] - [0.0, 0.8, 0.0]
+    got = World(BOUNDS, shapes).is_blocked(start, end)
+    lower = [Box(b.xmin, b.xmax, b.zmin, b.zmax, b.height - 1e-3, b.has_boards) for b in shapes[:-1]]
+    lower.append(Polygon(shapes[-1].points, 0.999))
+    for row in range(20):
+        sampled = is_blocked_by_samples(shapes, start[row], end[row])
+        # Samples miss what is shorter than their distance.
+        if sampled == is_blocked_by_samples(lower, start[row], end[row]):
+            assert got[row] == sampled or (got[row] and touches(shapes, start[row], end[row]))
+
+
+def touches(shapes, start, end):
+    """The way cuts less than a few millimetres of a corner."""
+    line = shapely.LineString([start[[0, 2]], end[[0, 2]]])
+    cuts = [line.intersection(shape.geometry()).length for shape in shapes]
+    return any(0.0 < cut < 5e-3 for cut in cuts)
+
+
+def test_a_thin_wall_is_in_the_way_below_its_height():
+    world = World(BOUNDS, [Wall((-1.0, 0.5), (1.0, 0.5), height=1.2)])
+    shoulder = np.array([[0.0, 1.4, 0.0]])
+    for target, is_blocked in (
+        ((0.0, 1.0, 1.0), False),
+        ((0.0, 0.9, 1.0), True),
+        ((0.0, 0.3, 0.49), False),
+        ((0.0, 0.3, 0.5), False),
+        ((0.0, 0.3, 0.54), True),
+        ((2.5, 0.3, 1.0), False),
+        ((0.0, np.nan, 1.0), False),
+    ):
+        assert world.is_blocked(shoulder, np.array([target]))[0] == is_blocked, target
