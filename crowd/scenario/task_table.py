@@ -76,7 +76,7 @@ class TaskTable(Table):
     hand_over: Name | None = None
     """Walk to another person, who has a task `take_from`, and give away what the hand holds."""
     take_from: Name | None = None
-    """Wait for another person and take what is held out."""
+    """Wait for another person, who has a task `hand_over`, and take what is held out."""
     look_at: Something | None = None
     """Look at an object, a person or a point [x, y, z]."""
     wait: NotNegative | None = None

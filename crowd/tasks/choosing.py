@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.state import FloatArray, IntArray
+from crowd.tasks.partners import missing_half
 from crowd.tasks.present_task import free_hand, held_object, holding_hand, task_of, wanted_hand
 from crowd.tasks.standing_place import find_standing_place, is_behind_walls
 from crowd.tasks.task_list import Hand, Target, TaskKind
@@ -37,6 +38,8 @@ NEIGHBORHOOD = 3.0
 """People farther than this from a target do not stand in the way, m."""
 HIGHEST = 1.0
 """Height over stature above which people take other things of the kind first."""
+LOOKS_FOR_SOMEBODY = 5
+"""Times that a person looks for the other one of two who hand something over before the task fails."""
 MOST_CONSIDERED = 10
 """Objects or places on boards that are tried, the nearest first."""
 
@@ -186,8 +189,8 @@ def choose_taker(tasks: Tasks, row: int, time: float) -> Outcome:
     _, other, _ = task_of(tasks, row)
     if item < 0:
         return Outcome.EMPTY_HANDED
-    if other == row or not state.is_active[other]:
-        return Outcome.FAIL
+    if (outcome := find_partner(tasks, row, time)) is not Outcome.NEXT:
+        return outcome
     tasks.object[row] = item
     tasks.hand[row] = holding_hand(tasks, item)
     ahead = state.yaw[other] + np.linspace(0.0, math.pi, 7)[:, None] * np.array([1.0, -1.0])
@@ -209,6 +212,13 @@ def choose_taker(tasks: Tasks, row: int, time: float) -> Outcome:
     tasks.place_yaw[row] = math.atan2(way[0], way[2])
     tasks.has_place[row] = True
     return Outcome.NEXT
+
+
+def find_partner(tasks: Tasks, row: int, time: float) -> Outcome:
+    """See whether the other person has a task for the other half; programs may give it a little later."""
+    if not missing_half(tasks, row):
+        return Outcome.NEXT
+    return Outcome.FAIL if tasks.look[row] < LOOKS_FOR_SOMEBODY else Outcome.ALONE
 
 
 def face_giver(tasks: Tasks, row: int, time: float) -> Outcome:

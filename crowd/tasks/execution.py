@@ -16,10 +16,11 @@ from crowd.motion.library import MotionLibrary
 from crowd.state import BoolArray, FloatArray, IntArray
 from crowd.tasks.acting import CARRYING_CLIPS, let_go_of_everything
 from crowd.tasks.events import EventKind, Events
+from crowd.tasks.partners import check_partners, missing_half
 from crowd.tasks.programs import PROGRAMS
 from crowd.tasks.settle import settle_parameters
 from crowd.tasks.task_list import TaskArrays, TaskEncoder, TaskKind, TaskNames, scenario_tasks
-from crowd.tasks.waits import Outcome, Wait, has_failed, is_over
+from crowd.tasks.waits import WAITS_FOR_SOMEBODY, Outcome, Wait, has_failed, is_over
 
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
@@ -87,6 +88,7 @@ class Tasks:
         self.lists: TaskArrays = scenario_tasks(simulation.scenario, model.placed, self.names)
         if self.lists.count.any():
             require_clips(model.library)
+            check_partners(self.lists, model.placed, simulation.scenario.source)
         capacity = model.capacity
         self.index: IntArray = np.zeros(capacity, np.int32)
         self.move: npt.NDArray[np.uint8] = np.zeros(capacity, np.uint8)
@@ -173,6 +175,10 @@ class Tasks:
             self._retry(int(row), step.time, "the hand cannot do it")
         for row in doing[is_late & ~has_failed_now]:
             self._time_out(int(row), step.time)
+        for row in doing[np.isin(self.wait[doing], WAITS_FOR_SOMEBODY)]:
+            if why := missing_half(self, int(row)):
+                let_go_of_everything(self, int(row))
+                self._give_up(int(row), step.time, why)
 
     # ---- one person
 
@@ -201,6 +207,9 @@ class Tasks:
             may_change = self.simulation.model.timetable.changes_after(time)
             if outcome is Outcome.FAIL or (outcome is Outcome.BEHIND_WALLS and may_change):
                 self._look_again(row, time)
+                return
+            if outcome is Outcome.ALONE:
+                self._give_up(row, time, missing_half(self, row))
                 return
             if outcome in HOPELESS:
                 let_go_of_everything(self, row)

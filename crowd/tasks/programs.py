@@ -36,6 +36,7 @@ from crowd.tasks.choosing import (
     choose_touch,
     choose_walk,
     face_giver,
+    find_partner,
 )
 from crowd.tasks.task_list import TaskKind
 from crowd.tasks.waits import Outcome, Wait
@@ -111,6 +112,7 @@ PROGRAMS: dict[TaskKind, tuple[Move, ...]] = {
         LOOK_AWAY,
     ),
     TaskKind.TAKE_FROM: (
+        Move(find_partner),
         Move(wait, Wait.GIVER_NEAR, LONGEST_MEETING),
         Move(face_giver),
         Move(settle, Wait.SETTLED, LONGEST_SETTLING),

@@ -47,6 +47,15 @@ class Target(IntEnum):
     CLIP = 5
 
 
+NOUNS = {
+    Target.OBJECTS: "object",
+    Target.FURNITURE: "furniture",
+    Target.CHARACTER: "person",
+    Target.CLIP: "gesture or idle clip",
+}
+"""What messages call targets."""
+
+
 class Hand(IntEnum):
     """Which hand does a task."""
 
@@ -216,8 +225,9 @@ class TaskEncoder:
             if name in known:
                 return kind, known[name]
         known_names = [key for _, known in choices for key in known]
-        allowed = nearest_first(name, known_names) if known_names else "nothing here has a name"
-        self._problems.add(location, f"nothing to {action.replace('_', ' ')} has this name", name, allowed)
+        what = "seat" if action == "sit" else " or ".join(NOUNS[kind] for kind, _ in choices)
+        allowed = nearest_first(name, known_names) if known_names else f"there is no {what} here"
+        self._problems.add(location, f"no {what} has this name", name, allowed)
         return Target.NOTHING, 0
 
 

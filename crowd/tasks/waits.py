@@ -39,6 +39,8 @@ class Outcome(Enum):
     """There is nothing in the hands to do it with."""
     BEHIND_WALLS = 4
     """Obstacles keep the hands away from it, wherever one stands."""
+    ALONE = 5
+    """The other person has no task for it."""
 
 
 class Wait(IntEnum):
@@ -60,6 +62,10 @@ class Wait(IntEnum):
     OFFERED = 13
     TAKEN = 14
     TOUCHING = 15
+
+
+WAITS_FOR_SOMEBODY = (Wait.GIVER_NEAR, Wait.TAKER_READY, Wait.OFFERED, Wait.TAKEN)
+"""Waits that only the other person's task ends."""
 
 
 def is_over(tasks: Tasks, step: Step, doing: IntArray) -> BoolArray:

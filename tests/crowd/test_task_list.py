@@ -45,10 +45,10 @@ def test_names_stand_for_their_families():
 @pytest.mark.parametrize(
     ("tasks", "message"),
     [
-        ('{ pick_up = "cop" }', "tasks[0].pick_up: nothing to pick up has this name; got 'cop'"),
-        ('{ sit = "table" }', "tasks[0].sit: nothing to sit has this name; got 'table'"),
-        ('{ play = "walk" }', "tasks[0].play: nothing to play has this name; got 'walk'"),
-        ('{ hand_over = "anne" }', "tasks[0].hand_over: nothing to hand over has this name; got 'anne'"),
+        ('{ pick_up = "cop" }', "tasks[0].pick_up: no object has this name; got 'cop'"),
+        ('{ sit = "table" }', "tasks[0].sit: no seat has this name; got 'table'; allowed there is no"),
+        ('{ play = "walk" }', "tasks[0].play: no gesture or idle clip has this name; got 'walk'"),
+        ('{ hand_over = "anne" }', "tasks[0].hand_over: no person has this name; got 'anne'; allowed"),
         ("{ walk_to = [9.0, 0.0] }", "tasks[0].walk_to: goal is outside the bounds; got [9.0, 0.0]"),
         ("{ walk_to = [0.0, 2.3] }", "tasks[0].walk_to: goal is inside a wall; got [0.0, 2.3]"),
         ("{ put_down = [0.0, 0.7, 9.0] }", "tasks[0].put_down: point is outside the bounds; got [0.0, 9.0]"),
@@ -89,7 +89,7 @@ def test_programs_give_tasks_in_the_same_words(tmp_path):
 
 def test_programs_are_told_what_is_wrong(tmp_path):
     simulation = load(tmp_path, "{ wait = 0.1 }")
-    with pytest.raises(ScenarioError, match=r"nothing to pick up has this name; got 'cap'; allowed \"cup\""):
+    with pytest.raises(ScenarioError, match=r"no object has this name; got 'cap'; allowed \"cup\""):
         simulation.commands.do(0, [{"pick_up": "cap"}])
     with pytest.raises(SettingsError, match="list of character 0 is too long; got 8; allowed 7 more tasks"):
         simulation.commands.do(0, [{"wait": 1.0}] * 8)
@@ -122,3 +122,70 @@ def test_a_scenario_with_tasks_can_be_written_and_read_again():
 
 def test_kinds_of_tasks_are_the_actions_of_scenarios():
     assert tuple(kind.name.lower() for kind in TaskKind) == ACTIONS
+
+
+def pair(folder, *lists):
+    """People of the names ann, ben and cid with these tasks."""
+    world, people = SCENE.split("[[characters]]")[0].format(), ""
+    for row, (name, tasks) in enumerate(zip(("ann", "ben", "cid"), lists, strict=False)):
+        people += f'[[characters]]\nname = "{name}"\nposition = [{row}.0, 0.0]\ntasks = [{tasks}]\n\n'
+    path = folder / "pair.toml"
+    path.write_text(world + people, encoding="utf-8")
+    return crowd.Simulation(crowd.load_scenario(path), threads=1)
+
+
+@pytest.mark.parametrize(
+    ("lists", "task", "what"),
+    [
+        (
+            ('{ take_from = "ben" }', "{ wait = 1.0 }"),
+            "tasks[0].take_from",
+            """no task hand_over = "ann"; got 'ben'; allowed somebody who has: nobody here""",
+        ),
+        (
+            ('{ take_from = "ben" }, { take_from = "cid" }', "{ wait = 1.0 }", '{ hand_over = "ann" }'),
+            "tasks[0].take_from",
+            """no task hand_over = "ann"; got 'ben'; allowed somebody who has: "cid\"""",
+        ),
+        (
+            ('{ hand_over = "ben" }, { hand_over = "ben" }', '{ take_from = "ann" }'),
+            "tasks[1].hand_over",
+            """only 1 task take_from = "ann"; got 'ben'; allowed somebody who has: "ben\"""",
+        ),
+        (
+            ('{ hand_over = "ann" }', "{ wait = 1.0 }"),
+            "tasks[0].hand_over",
+            """no task take_from = "ann"; got 'ann'; allowed somebody who has: nobody here""",
+        ),
+    ],
+)
+def test_nobody_waits_for_somebody_who_does_not_come(tmp_path, lists, task, what):
+    with pytest.raises(ScenarioError) as caught:
+        pair(tmp_path, *lists)
+    assert str(caught.value) == f"pair.toml: line 16: characters[0].{task}: this person has {what}"
+
+
+def test_whoever_waits_for_nobody_is_told_soon(tmp_path):
+    simulation = pair(tmp_path, "{ wait = 0.1 }", "{ wait = 0.1 }")
+    simulation.commands.do(0, [{"take_from": "ben"}])
+    simulation.commands.do(1, [{"take_from": "ben"}])
+    for _ in simulation.run(seconds=10.0):
+        if simulation.is_finished:
+            break
+    told = [(event.character, event.kind.value, event.detail) for event in simulation.events]
+    assert told[2:] == [
+        (0, "task_failed", 'ben has no task hand_over = "ann"'),
+        (1, "task_failed", "nobody does this with oneself"),
+    ]
+
+
+def test_whoever_waits_is_told_when_the_other_gives_up(tmp_path):
+    simulation = pair(tmp_path, '{ take_from = "ben" }', '{ wait = 1.0 }, { hand_over = "ann" }')
+    for _ in simulation.run(seconds=3.0):
+        pass
+    told = [(event.character, event.task, event.detail) for event in simulation.events]
+    assert told == [
+        (1, "wait", ""),
+        (1, "hand_over", "the hands are empty"),
+        (0, "take_from", 'ben has no task hand_over = "ann"'),
+    ]
