@@ -4,6 +4,12 @@ Numba's on-disk cache knows the content of a kernel's own file and nothing else:
 goes unseen, and the serial and the parallel build of one function share a cache file. Both are cured here by
 folding a digest into the name under which a kernel is cached: the sources of the kernel's module and of
 every module of this package that it imports, directly or not, and the build flags.
+
+Kernels borrow their arrays: who calls the outermost one owns them until it returns. So all but threaded
+drivers are compiled without Numba's reference counting, which would count every array, slice and field of a
+tuple up and down atomically, and take longer than the arithmetic of a row. In turn a kernel that allocates,
+copies one array into another as a whole, or returns a part of one, does not compile: Numba says that it needs
+its runtime.
 """
 
 import ast
@@ -79,7 +85,12 @@ def _compile(function: Callable[P, R], *, parallel: bool = False, is_inlined: bo
     function.__qualname__ = f"{name}-{digest}{flags}"
     try:
         compiled = numba.njit(
-            cache=True, error_model="numpy", parallel=parallel, nogil=True, forceinline=is_inlined
+            cache=True,
+            error_model="numpy",
+            parallel=parallel,
+            nogil=True,
+            forceinline=is_inlined,
+            _nrt=parallel,
         )(function)
     finally:
         function.__qualname__ = name
@@ -94,9 +105,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a row leaf that LLVM merges into its callers.
 
-    A slice handed to a kernel that stays a call of its own is counted up and down atomically, in memory that
-    all threads share. For a leaf of some tens of instructions this takes longer than its arithmetic; merged,
-    the counting vanishes, and rows stay rows, unlike with Numba's own ``inline="always"``.
+    Rows stay rows, unlike with Numba's own ``inline="always"``, so that loops over lanes are vectorised.
     """
     return _compile(function, is_inlined=True)
 

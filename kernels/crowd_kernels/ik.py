@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
+from crowd_kernels._jit import kernel, parallel_kernel, prange
 from crowd_kernels.ik_rows import (
     ANGLE,
     BLOCK,
@@ -296,36 +296,16 @@ def scratch_length(joint_count: int, effector_count: int, segment_count: int) ->
     )
 
 
-@inlined_kernel
-def joint_at(joints: Any, k: int) -> Any:
-    """Find the row of a joint; -1 is the root."""
-    return joints[(k + 1) * JOINT_ROW : (k + 2) * JOINT_ROW]
+@kernel
+def block_of(row: int, column: int) -> int:
+    """Find a block in the lower triangle of the system."""
+    return row * (row + 1) // 2 + column
 
 
-@inlined_kernel
-def effector_at(effectors: Any, e: int) -> Any:
-    """Find the row of an effector."""
-    return effectors[e * EFFECTOR_ROW : (e + 1) * EFFECTOR_ROW]
-
-
-@inlined_kernel
-def push_at(push: Any, e: int) -> Any:
-    """Find what belongs to an effector in the right side or the solution."""
-    return push[e * PUSH : (e + 1) * PUSH]
-
-
-@inlined_kernel
-def part_at(push: Any, row: int, parts: int) -> Any:
-    """Find the three elements of the right side or the solution that belong to a row of blocks."""
-    begin = row // parts * PUSH + row % parts * 3 * LANES
-    return push[begin : begin + 3 * LANES]
-
-
-@inlined_kernel
-def block_at(system: Any, row: int, column: int) -> Any:
-    """Find a block of the system's lower triangle."""
-    begin = (row * (row + 1) // 2 + column) * BLOCK
-    return system[begin : begin + BLOCK]
+@kernel
+def half_of(row: int, parts: int) -> int:
+    """Find the half of an effector's push that belongs to a row of blocks."""
+    return row // parts * 2 + row % parts
 
 
 @kernel
@@ -340,37 +320,38 @@ def solve_system(count: int, parts: int, damping: Any, system: Any, out_push: An
         Rows of blocks of an effector: 1 position, 2 position and rotation.
     damping : (16,) float32
         Added to the diagonal.
-    system : (count * (count + 1) / 2 * 144,) float32
+    system : (count * (count + 1) / 2, 144) float32
         Blocks of the lower triangle, replaced by the factor.
-    out_push : (E * PUSH,) float32
+    out_push : (E, PUSH) float32
         In: the right side. Out: the solution.
     """
+    halves = out_push.reshape(2 * out_push.shape[0], PUSH // 2)
     for row in range(count):
         for column in range(row):
             for inner in range(column):
                 subtract_block(
-                    block_at(system, row, inner),
-                    block_at(system, column, inner),
-                    block_at(system, row, column),
+                    system[block_of(row, inner)],
+                    system[block_of(column, inner)],
+                    system[block_of(row, column)],
                 )
-            divide_block(block_at(system, column, column), block_at(system, row, column))
+            divide_block(system[block_of(column, column)], system[block_of(row, column)])
         for inner in range(row):
             subtract_block(
-                block_at(system, row, inner), block_at(system, row, inner), block_at(system, row, row)
+                system[block_of(row, inner)], system[block_of(row, inner)], system[block_of(row, row)]
             )
-        factor_block(damping, block_at(system, row, row))
+        factor_block(damping, system[block_of(row, row)])
     for row in range(count):
         for column in range(row):
             subtract_lower(
-                block_at(system, row, column), part_at(out_push, column, parts), part_at(out_push, row, parts)
+                system[block_of(row, column)], halves[half_of(column, parts)], halves[half_of(row, parts)]
             )
-        solve_lower(block_at(system, row, row), part_at(out_push, row, parts))
+        solve_lower(system[block_of(row, row)], halves[half_of(row, parts)])
     for row in range(count - 1, -1, -1):
         for column in range(row + 1, count):
             subtract_upper(
-                block_at(system, column, row), part_at(out_push, column, parts), part_at(out_push, row, parts)
+                system[block_of(column, row)], halves[half_of(column, parts)], halves[half_of(row, parts)]
             )
-        solve_upper(block_at(system, row, row), part_at(out_push, row, parts))
+        solve_upper(system[block_of(row, row)], halves[half_of(row, parts)])
 
 
 @kernel
@@ -382,20 +363,18 @@ def place_joints(tree: TreeArrays, scale: Any, joints: Any) -> None:
     tree : TreeArrays
     scale : (G * 16,) float32
         Proportions.
-    joints : ((K + 1) * JOINT_ROW,) float32
+    joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
     """
     for k in range(tree.joint.shape[0]):
-        above = (tree.parent[k] + 1) * JOINT_ROW
-        here = (k + 1) * JOINT_ROW
         part = tree.segment[k] * LANES
         forward_row(
-            joints[above : above + JOINT_ROW],
+            joints[tree.parent[k] + 1],
             scale[part : part + LANES],
             tree.offset[k, 0],
             tree.offset[k, 1],
             tree.offset[k, 2],
-            joints[here : here + JOINT_ROW],
+            joints[k + 1],
         )
 
 
@@ -413,7 +392,7 @@ def free_joints(tree: TreeArrays, settings: SolveSettings, joints: Any) -> None:
     ----------
     tree : TreeArrays
     settings : SolveSettings
-    joints : ((K + 1) * JOINT_ROW,) float32
+    joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
     """
     gain = np.float32(settings.pull)
@@ -421,21 +400,18 @@ def free_joints(tree: TreeArrays, settings: SolveSettings, joints: Any) -> None:
     for k in range(tree.joint.shape[0]):
         if tree.weight[k] <= ZERO:
             continue
-        above = (tree.parent[k] + 1) * JOINT_ROW
-        here = (k + 1) * JOINT_ROW
-        pull_row(
-            joints[above : above + JOINT_ROW], tree.weight[k], gain, bound, joints[here : here + JOINT_ROW]
-        )
+        above = joints[tree.parent[k] + 1]
+        pull_row(above, tree.weight[k], gain, bound, joints[k + 1])
         if tree.is_limited[k]:
             for axis in range(3):
                 if tree.is_free[k, axis] == ZERO:
                     lock_axis_row(
-                        joints[above : above + JOINT_ROW],
+                        above,
                         tree.weight[k],
                         frame_of(tree.parent_frame, k),
                         frame_of(tree.joint_frame, k),
                         axis,
-                        joints[here : here + JOINT_ROW],
+                        joints[k + 1],
                     )
 
 
@@ -450,56 +426,55 @@ def build_system(
     tree : TreeArrays
     parts : int
         Rows of blocks of an effector: 1 position, 2 position and rotation.
-    joints : ((K + 1) * JOINT_ROW,) float32
+    joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
-    effectors : (E * EFFECTOR_ROW,) float32
-    out_system : (E * parts * (E * parts + 1) / 2 * 144,) float32
+    effectors : (E, EFFECTOR_ROW) float32
+    out_system : (E * parts * (E * parts + 1) / 2, 144) float32
         Blocks of the lower triangle.
-    out_push : (E * PUSH,) float32
+    out_push : (E, PUSH) float32
         Right side.
     """
     root_weight = np.float32(tree.root_weight)
-    for index in range(out_system.shape[0]):
-        out_system[index] = ZERO
+    out_system[:] = ZERO
     for a in range(tree.effector.shape[0]):
-        start_push_row(effector_at(effectors, a), push_at(out_push, a))
+        start_push_row(effectors[a], out_push[a])
         if root_weight > ZERO:
-            root_subtract_row(joint_at(joints, -1), effector_at(effectors, a), push_at(out_push, a))
+            root_subtract_row(joints[0], effectors[a], out_push[a])
         for k in range(tree.joint.shape[0]):
             if tree.moves[a, k]:
-                subtract_drift_row(joint_at(joints, k), effector_at(effectors, a), push_at(out_push, a))
+                subtract_drift_row(joints[k + 1], effectors[a], out_push[a])
         for b in range(a + 1):
             if root_weight > ZERO:
                 root_accumulate_row(
-                    effector_at(effectors, a),
-                    effector_at(effectors, b),
+                    effectors[a],
+                    effectors[b],
                     root_weight,
-                    block_at(out_system, a * parts, b * parts),
+                    out_system[block_of(a * parts, b * parts)],
                 )
             # The two blocks of a's rotation are neighbours.
-            frames = ((2 * a + 1) * (2 * a + 2) // 2 + 2 * b) * BLOCK
+            frames = block_of(2 * a + 1, 2 * b)
             for k in range(tree.joint.shape[0]):
                 if not (tree.moves[a, k] and tree.moves[b, k]):
                     continue
                 accumulate_place_row(
-                    joint_at(joints, k),
-                    effector_at(effectors, a),
-                    effector_at(effectors, b),
-                    block_at(out_system, a * parts, b * parts),
+                    joints[k + 1],
+                    effectors[a],
+                    effectors[b],
+                    out_system[block_of(a * parts, b * parts)],
                 )
                 if parts == 2:
                     accumulate_frame_row(
-                        joint_at(joints, k),
-                        effector_at(effectors, a),
-                        effector_at(effectors, b),
-                        out_system[frames : frames + 2 * BLOCK],
+                        joints[k + 1],
+                        effectors[a],
+                        effectors[b],
+                        out_system[frames : frames + 2].reshape(2 * BLOCK),
                     )
                     if a != b:
                         accumulate_cross_row(
-                            joint_at(joints, k),
-                            effector_at(effectors, a),
-                            effector_at(effectors, b),
-                            block_at(out_system, 2 * a, 2 * b + 1),
+                            joints[k + 1],
+                            effectors[a],
+                            effectors[b],
+                            out_system[block_of(2 * a, 2 * b + 1)],
                         )
 
 
@@ -512,10 +487,10 @@ def turn_joints(
     Parameters
     ----------
     tree : TreeArrays
-    joints : ((K + 1) * JOINT_ROW,) float32
+    joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
-    effectors : (E * EFFECTOR_ROW,) float32
-    push : (E * PUSH,) float32
+    effectors : (E, EFFECTOR_ROW) float32
+    push : (E, PUSH) float32
         Solution of the system.
     running : (16,) float32
         0 where the character stays as it is.
@@ -526,14 +501,14 @@ def turn_joints(
     for k in range(tree.joint.shape[0]):
         if tree.weight[k] <= ZERO:
             continue
-        start_step_row(joint_at(joints, k))
+        start_step_row(joints[k + 1])
         for e in range(tree.effector.shape[0]):
             if tree.moves[e, k]:
-                add_torque_row(effector_at(effectors, e), push_at(push, e), joint_at(joints, k))
-        step_row(joint_at(joints, tree.parent[k]), running, joint_at(joints, k))
+                add_torque_row(effectors[e], push[e], joints[k + 1])
+        step_row(joints[tree.parent[k] + 1], running, joints[k + 1])
         if tree.is_limited[k]:
             limit_row(
-                joint_at(joints, tree.parent[k]),
+                joints[tree.parent[k] + 1],
                 tree.weight[k],
                 frame_of(tree.parent_frame, k),
                 frame_of(tree.joint_frame, k),
@@ -543,7 +518,7 @@ def turn_joints(
                 tree.is_free[k, 1],
                 tree.is_free[k, 2],
                 running,
-                joint_at(joints, k),
+                joints[k + 1],
                 out_violations,
             )
 
@@ -574,12 +549,12 @@ def solve_block(
         Proportions.
     root_reference : (48,) float32
         Where the root is drawn to, m.
-    joints : ((K + 1) * JOINT_ROW,) float32
+    joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
-    effectors : (E * EFFECTOR_ROW,) float32
-    system : (E * (2 * E + 1) * 144,) float32
+    effectors : (E, EFFECTOR_ROW) float32
+    system : (E * (2 * E + 1), 144) float32
         Scratch.
-    push : (E * PUSH,) float32
+    push : (E, PUSH) float32
         Scratch.
     control : (5 * 16,) float32
         Scratch.
@@ -596,7 +571,7 @@ def solve_block(
     iterations = out_iterations[:LANES]
     stalled = out_iterations[LANES : 2 * LANES]
     root_weight = np.float32(tree.root_weight)
-    used = parts * count * (parts * count + 1) // 2 * BLOCK
+    used = parts * count * (parts * count + 1) // 2
     for lane in range(LANES):
         best[lane] = FAR
         running[lane] = ONE
@@ -611,14 +586,14 @@ def solve_block(
         waiting = np.float32(settings.waiting_distance) if iteration < settings.place_first else FAR
         for e in range(count):
             effector_row(
-                joint_at(joints, tree.effector[e]),
-                joint_at(joints, tree.base[e]),
+                joints[tree.effector[e] + 1],
+                joints[tree.base[e] + 1],
                 np.float32(settings.reach),
                 (np.float32(settings.place_step), np.float32(settings.turn_step)),
                 waiting,
                 (np.float32(settings.distance_tolerance), np.float32(settings.angle_tolerance)),
                 np.float32(settings.error_damping),
-                effector_at(effectors, e),
+                effectors[e],
                 totals,
             )
         is_early = ONE if iteration < settings.least_iterations else ZERO
@@ -633,7 +608,7 @@ def solve_block(
                     root_reference,
                     np.float32(settings.pull),
                     np.float32(settings.place_step),
-                    joint_at(joints, -1),
+                    joints[0],
                 )
             build_system(tree, parts, joints, effectors, system[:used], push)
             solve_system(parts * count, parts, damping, system, push)
@@ -642,11 +617,11 @@ def solve_block(
                 break
         for k in range(tree.joint.shape[0]):
             if tree.weight[k] > ZERO:
-                commit_row(joint_at(joints, k))
+                commit_row(joints[k + 1])
         if root_weight > ZERO:
             for e in range(count):
-                root_push_row(effector_at(effectors, e), push_at(push, e), root_weight, joint_at(joints, -1))
-            root_commit_row(running, joint_at(joints, -1))
+                root_push_row(effectors[e], push[e], root_weight, joints[0])
+            root_commit_row(running, joints[0])
 
 
 @kernel
@@ -682,7 +657,7 @@ def gather_effectors(
     ----------
     first : int
         Place in `active` of the first lane.
-    out_effectors : (E * EFFECTOR_ROW,) float32
+    out_effectors : (E, EFFECTOR_ROW) float32
         Written.
 
     Returns
@@ -698,7 +673,7 @@ def gather_effectors(
     parts = 1
     for e in range(tree.effector.shape[0]):
         column = tree.column[e]
-        row = out_effectors[e * EFFECTOR_ROW : (e + 1) * EFFECTOR_ROW]
+        row = out_effectors[e]
         for lane in range(LANES):
             character = active[min(first + lane, count - 1)]
             wants_place = (task[character, column] & POSITION) != 0
@@ -757,7 +732,7 @@ def gather_joints(
         Place in `active` of the first lane.
     out_scale : (G * 16,) float32
         Written.
-    out_joints : ((K + 1) * JOINT_ROW,) float32
+    out_joints : (K + 1, JOINT_ROW) float32
         Written.
 
     Notes
@@ -771,17 +746,18 @@ def gather_joints(
             out_scale[part * LANES + lane] = segment_scale[character, part]
         scale = segment_scale[character, tree.root_segment]
         for axis in range(3):
-            out_joints[PLACE + axis * LANES + lane] = root_position[character, axis] * scale
-    out_joints[FRAME : FRAME + LANES] = ONE
-    out_joints[FRAME + LANES : FRAME + 4 * LANES] = ZERO
+            out_joints[0, PLACE + axis * LANES + lane] = root_position[character, axis] * scale
+    out_joints[0, FRAME : FRAME + LANES] = ONE
+    out_joints[0, FRAME + LANES : FRAME + 4 * LANES] = ZERO
     for k in range(tree.joint.shape[0]):
         for component in range(4):
             index = component * tree.component_step + tree.joint[k] * tree.joint_step
-            begin = (k + 1) * JOINT_ROW + component * LANES
+            begin = component * LANES
+            row = out_joints[k + 1]
             for lane in range(LANES):
                 character = active[min(first + lane, count - 1)]
-                out_joints[begin + ROTATION + lane] = pose_rotation[character, index]
-                out_joints[begin + REFERENCE + lane] = reference_rotation[character, index]
+                row[begin + ROTATION + lane] = pose_rotation[character, index]
+                row[begin + REFERENCE + lane] = reference_rotation[character, index]
     for k in range(tree.joint.shape[0]):
         if tree.is_limited[k]:
             hold_reference_row(
@@ -791,7 +767,7 @@ def gather_joints(
                 tree.inverse_swing[k, 1],
                 tree.twist[k, 0],
                 tree.twist[k, 1],
-                out_joints[(k + 1) * JOINT_ROW : (k + 2) * JOINT_ROW],
+                out_joints[k + 1],
             )
 
 
@@ -855,10 +831,10 @@ def solve_chunk(
     push_begin = system_begin + effector_count * (2 * effector_count + 1) * BLOCK
     scale_begin = push_begin + effector_count * 6 * LANES
     control_begin = scale_begin + segment_scale.shape[1] * LANES
-    joints = scratch[:effector_begin]
-    effectors = scratch[effector_begin:system_begin]
-    system = scratch[system_begin:push_begin]
-    push = scratch[push_begin:scale_begin]
+    joints = scratch[:effector_begin].reshape(joint_count + 1, JOINT_ROW)
+    effectors = scratch[effector_begin:system_begin].reshape(effector_count, EFFECTOR_ROW)
+    system = scratch[system_begin:push_begin].reshape(effector_count * (2 * effector_count + 1), BLOCK)
+    push = scratch[push_begin:scale_begin].reshape(effector_count, PUSH)
     scale = scratch[scale_begin:control_begin]
     control = scratch[control_begin : control_begin + 5 * LANES]
     root_reference = scratch[control_begin + 5 * LANES : control_begin + 8 * LANES]
@@ -901,7 +877,7 @@ def solve_chunk(
             out_iterations[character] = int(iterations[lane])
             for e in range(effector_count):
                 column = tree.column[e]
-                effector = effectors[e * EFFECTOR_ROW : (e + 1) * EFFECTOR_ROW]
+                effector = effectors[e]
                 out_status[character, column] = status_of(
                     int(task[character, column]), effector, lane, iterations[LANES + lane], settings
                 )
@@ -910,14 +886,14 @@ def solve_chunk(
             pose = pose_rotation[character]
             for k in range(joint_count):
                 if tree.weight[k] > ZERO:
-                    row = (k + 1) * JOINT_ROW + ROTATION + lane
+                    row = ROTATION + lane
                     for component in range(4):
                         index = component * tree.component_step + tree.joint[k] * tree.joint_step
-                        pose[index] = joints[row + component * LANES]
+                        pose[index] = joints[k + 1, row + component * LANES]
             if tree.root_weight > 0.0:
                 for axis in range(3):
                     root_position[character, axis] = (
-                        joints[PLACE + axis * LANES + lane] / segment_scale[character, tree.root_segment]
+                        joints[0, PLACE + axis * LANES + lane] / segment_scale[character, tree.root_segment]
                     )
 
 

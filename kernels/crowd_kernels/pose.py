@@ -256,7 +256,8 @@ def local_rotation_chunk(
             PADDED_JOINTS,
             row,
         )
-        out_rows[character] = row[:length]
+        for place in range(length):
+            out_rows[character, place] = row[place]
 
 
 @parallel_kernel
