@@ -54,7 +54,7 @@ class FrameResult:
     problem: str
     peak_memory_mb: float
     layers: dict[str, float]
-    """The same for each layer of the controller stack."""
+    """The same for each layer of the controller stack, and for the parts of reaching."""
 
     def as_dict(self) -> dict[str, Any]:
         """Form for JSON."""
@@ -93,7 +93,8 @@ def measure_frames(
     for _ in simulation.run(seconds=WARM_UP_SECONDS):
         if hands is not None:
             hands.ask()
-    for seconds_used in (simulation.stage_seconds, simulation.layer_seconds):
+    used = (simulation.stage_seconds, simulation.layer_seconds, simulation.reach.part_seconds)
+    for seconds_used in used:
         seconds_used.update(dict.fromkeys(seconds_used, 0.0))
     start_step = simulation.step_index
     begin = time.perf_counter()
@@ -109,6 +110,8 @@ def measure_frames(
     frames = simulation.step_index - start_step
     per_item = 1e6 / (frames * characters)
     problem = find_problem(simulation, name)
+    reach_parts = simulation.reach.part_seconds
+    layers = simulation.layer_seconds | {f"Reach ({part})": reach_parts[part] for part in reach_parts}
     return FrameResult(
         name,
         characters,
@@ -119,7 +122,7 @@ def measure_frames(
         not problem,
         problem,
         resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
-        {layer: seconds_used * per_item for layer, seconds_used in simulation.layer_seconds.items()},
+        {layer: seconds_used * per_item for layer, seconds_used in layers.items()},
     )
 
 

@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from crowd.bench.report import PAPER_MILLISECONDS
 from crowd.errors import SettingsError, describe
 
-# Feng, Xu, Shapiro, table 2, milliseconds per character and update. The paper prints figure 7 without
-# numbers; frames per second follow from the table as 1000 / (characters * milliseconds).
-PAPER_LOCOMOTION_MS = 0.21
-PAPER_STEERING_MS = 0.70
-PAPER_TOTAL_MS = 1.68
+# The paper prints figure 7, of reaching and of locomotion, without numbers; frames per second follow from its
+# table 2 as 1000 / (characters * milliseconds).
+PAPER_CURVES = {
+    "reaching": ("reach (blending)", "reach (inverse kinematics)"),
+    "locomotion and steering": ("locomotion", "steering"),
+    "everything": ("total",),
+}
 PAPER_CHARACTERS = 20
 """Number of characters up to which the paper states real-time performance."""
 
@@ -39,14 +42,11 @@ def draw(rows: Sequence[Mapping[str, Any]], machine: Mapping[str, Any], path: Pa
         points = sorted((row["characters"], row["fps"]) for row in rows if row["case"] == case)
         axes.plot(*zip(*points, strict=True), marker="o", label=case.replace("_", " "))
     count = np.geomspace(1, 10_000, 50)
-    for milliseconds, what in (
-        (PAPER_LOCOMOTION_MS + PAPER_STEERING_MS, "locomotion and steering"),
-        (PAPER_TOTAL_MS, "everything"),
-    ):
+    for what, parts in PAPER_CURVES.items():
+        milliseconds = sum(PAPER_MILLISECONDS[part] for part in parts)
         axes.plot(count, 1000.0 / (count * milliseconds), "--", lw=1, label=f"Feng et al., {what}")
-    axes.plot(
-        [PAPER_CHARACTERS], [1000.0 / (PAPER_CHARACTERS * PAPER_TOTAL_MS)], "kx", label='"over 20 characters"'
-    )
+    total = PAPER_MILLISECONDS["total"]
+    axes.plot([PAPER_CHARACTERS], [1000.0 / (PAPER_CHARACTERS * total)], "kx", label='"over 20 characters"')
     axes.axhline(60.0, color="0.6", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel="characters", ylabel="frames per second", ylim=(5, None))
     threads = max(row["threads"] for row in rows)

@@ -77,7 +77,15 @@ def print_frames(rows: Sequence[Mapping[str, Any]], earlier: Sequence[Mapping[st
 
 
 # Feng, Xu, Shapiro, table 2, milliseconds per character and update.
-PAPER_MILLISECONDS = {"locomotion": 0.21, "steering": 0.70, "reach": 0.70, "gaze": 0.07, "total": 1.68}
+PAPER_MILLISECONDS = {
+    "locomotion": 0.21,
+    "steering": 0.70,
+    "reach (blending)": 0.42,
+    "reach (inverse kinematics)": 0.28,
+    "gaze": 0.07,
+    "total": 1.68,
+}
+CONTROLLERS = ("Reach (blending)", "Reach (inverse kinematics)", "Grab", "Gaze", "Constraint")
 
 
 def print_controllers(row: Mapping[str, Any]) -> None:
@@ -87,7 +95,7 @@ def print_controllers(row: Mapping[str, Any]) -> None:
         "locomotion": stages["locomote"] + layers["Locomotion"],
         "steering": stages["navigate"] + stages["steer"],
     }
-    parts |= {name.lower(): layers[name] for name in ("Reach", "Grab", "Gaze", "Constraint")}
+    parts |= {name.lower(): layers[name] for name in CONTROLLERS}
     parts["total"] = row["us_per_character"]
     table = Table(box=None, pad_edge=False)
     for title in ("controller", "us/person", "paper, us", "times"):

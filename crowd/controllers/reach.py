@@ -1,5 +1,6 @@
 """Layer 5, reach: hands go to targets by blended examples, exact by inverse kinematics."""
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -116,6 +117,8 @@ class Reach:
         self._distance = np.zeros((capacity, 2), np.float32)
         self._angle = np.zeros((capacity, 2), np.float32)
         self._iterations = np.zeros(capacity, np.int32)
+        self.part_seconds = {"blending": 0.0, "inverse kinematics": 0.0}
+        """Time that the parts of this layer have taken, s."""
 
     @property
     def space(self) -> ReachSpace:
@@ -251,6 +254,7 @@ class Reach:
             return
         begins = (state.reach_stage == MOVE) & (state.reach_course == 0.0)
         parts = ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields))
+        begin = time.perf_counter()
         reach_crowd(
             self.space.arrays,
             self.space.keys,
@@ -273,6 +277,7 @@ class Reach:
             self._target,
             self._target_rotation,
         )
+        blended = time.perf_counter()
         np.copyto(self._point, state.reach_point_hand, casting="same_kind")
         solve_crowd(
             self._tree,
@@ -293,6 +298,8 @@ class Reach:
             self._angle,
             self._iterations,
         )
+        self.part_seconds["blending"] += blended - begin
+        self.part_seconds["inverse kinematics"] += time.perf_counter() - blended
         self._report(state, reaching, step.dt, parts)
         refused = begins & (state.reach_status == REFUSED)
         state.reach_stage[refused] = NONE

@@ -151,7 +151,7 @@ def test_generating_again_gives_the_stored_skins(stance):
         assert (made.triangle == stored.triangle).all()
         away = np.linalg.norm(made.position - stored.position, axis=1)
         same = away < 0.0003
-        # Processors round differently, and a point that could go to either of two places then takes the other.
+        # Processors round differently; a point that could go to either of two places then takes the other.
         assert same.mean() > 0.999
         assert away.max() < 0.002
         assert (np.abs(made.weight - stored.weight)[same] <= 0.012).all()
