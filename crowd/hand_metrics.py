@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.motion.rotation import multiply, rotate
-from crowd.tasks.events import EventKind
 from crowd_kernels.reach_goal import MOVE, REACHED
 
 if TYPE_CHECKING:
@@ -36,9 +35,7 @@ class HandMetrics:
         self._finger_depth = 0.0
         self._sampled_at = -np.inf
         self._was_held = False
-        self._placed: dict[int, FloatArray] = {}
-        self._placed_error = 0.0
-        self._event_count = 0
+        self._placed_error = np.nan
 
     def observe(self, simulation: Simulation) -> None:
         """Take the state after a step into account."""
@@ -57,28 +54,12 @@ class HandMetrics:
         objects = simulation.objects
         for held in np.flatnonzero(objects.holder >= 0):
             self._was_held = True
-            self._placed.pop(int(held), None)
             for hand in np.flatnonzero(objects.holder_hand[held]):
                 self._apart = max(self._apart, _distance_from_grip(simulation, int(held), int(hand)))
         if self._was_held and simulation.time - self._sampled_at >= SAMPLE_PERIOD:
             self._sampled_at = simulation.time
             self._finger_depth = max(self._finger_depth, deepest_finger(simulation))
-        self._note_placed(simulation)
-        for item, place in self._placed.items():
-            error = float(np.linalg.norm(objects.position_world[item] - place))
-            self._placed_error = max(self._placed_error, error)
-
-    def _note_placed(self, simulation: Simulation) -> None:
-        """Remember where objects should be that have just been put down."""
-        tasks, objects = simulation.tasks, simulation.objects
-        if tasks.events.count == self._event_count:
-            return
-        for event in tasks.events.last(tasks.events.count - self._event_count):
-            if event.kind is EventKind.OBJECT_PUT_DOWN:
-                item = simulation.model.objects.index(event.detail)
-                if objects.holder[item] < 0:
-                    self._placed[item] = tasks.target_world[event.character].copy()
-        self._event_count = tasks.events.count
+        self._placed_error = float(np.fmax(self._placed_error, np.fmax.reduce(objects.release_error)))
 
     def as_dict(self) -> dict[str, float | int]:
         """Figures that the run exercised, by dotted key."""
@@ -94,7 +75,7 @@ class HandMetrics:
         if self._was_held:
             result["held.apart_mm.max"] = MILLIMETRE * self._apart
             result["reach.finger_depth_mm.max"] = MILLIMETRE * self._finger_depth
-        if self._placed:
+        if np.isfinite(self._placed_error):
             result["placed.error_mm.max"] = MILLIMETRE * self._placed_error
         return result
 

@@ -182,6 +182,7 @@ class Grab:
             objects, things = self.objects, items[free]
             place = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))[free]
             near = np.linalg.norm(place - objects.position_world[things], axis=1)
+            objects.release_error[things] = near
             put = near <= self.settings.settle_distance
             objects.position_world[things[put]] = place[put]
             if rotation_world is not None:

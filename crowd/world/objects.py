@@ -125,6 +125,9 @@ class ObjectState:
         Centre of the object in the frame of each holding hand joint, m.
     grip_rotation : (M, 2, 4) float64
         Rotation of the object against each holding hand joint.
+    release_error : (M,) float64
+        How far the hand held the object from where it was to be put, when it last let go of it, m; NaN where
+        no place was asked for.
     """
 
     def __init__(self, objects: Objects) -> None:
@@ -135,6 +138,7 @@ class ObjectState:
         self.holder_hand: BoolArray = np.zeros((count, 2), np.bool_)
         self.grip_position: FloatArray = np.zeros((count, 2, 3))
         self.grip_rotation: FloatArray = np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 1))
+        self.release_error: FloatArray = np.full(count, np.nan)
 
     @property
     def count(self) -> int:

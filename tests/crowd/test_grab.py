@@ -141,6 +141,7 @@ def test_an_object_is_put_exactly_where_it_is_asked_when_it_is_near(run: Simulat
     run.grab.release(run.state, rows(0), 1, wanted, upright)
     run.step()
     assert np.array_equal(run.objects.position_world[BALL], wanted)
+    assert run.objects.release_error[BALL] == pytest.approx(np.linalg.norm([0.004, 0.003, 0.002]))
     assert np.array_equal(run.objects.rotation_world[BALL], upright)
 
 
@@ -149,6 +150,9 @@ def test_an_object_far_from_where_it_is_asked_stays_in_place(run: Simulation) ->
     place = run.objects.position_world[BALL].copy()
     run.grab.release(run.state, rows(0), 1, place + 0.5)
     assert np.array_equal(run.objects.position_world[BALL], place)
+    assert run.objects.release_error[BALL] == pytest.approx(0.5 * 3**0.5)
+    run.step()
+    assert run.metrics.as_dict()["placed.error_mm.max"] == pytest.approx(500 * 3**0.5)
 
 
 def test_a_touch_does_not_close_the_hand(run: Simulation) -> None:
