@@ -13,6 +13,7 @@ from crowd.controllers.grab import GrabStatus
 from crowd.errors import SettingsError, describe
 from crowd.motion.clip import ClipKind
 from crowd.motion.rotation import about, conjugate, multiply, yaw_of
+from crowd.people import HANDING_HEIGHT
 from crowd.scenario.task_table import TaskTable
 from crowd.tasks.execution import encode_tasks
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
 HANDS = ("right", "left")
-HANDING_HEIGHT = 0.64
-"""Height at which people hand things over, over stature."""
 Characters = int | slice | Sequence[int] | npt.NDArray[np.integer]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from crowd.controllers.grab import HOLDING
 from crowd.motion.rotation import about, conjugate, multiply, yaw_of
+from crowd.people import HANDING_HEIGHT
 from crowd.state import FloatArray
 from crowd.tasks.events import EventKind
 from crowd.tasks.present_task import hands_of, held_object, rows_of, task_of
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 CARRYING_CLIPS = ("carry_right", "carry_left")
 ARRIVAL_RADIUS = 0.3
 """Distance at which walking to a place ends and settling there begins, m."""
-OFFER_HEIGHT, OFFER_DISTANCE = 0.66, 0.45
-"""Where something is held out: height over stature, and distance ahead, m."""
+OFFER_DISTANCE = 0.45
+"""How far ahead something is held out, m."""
 OTHER_HEADINGS = (0.0, -0.45, 0.45, -0.9, 0.9)
 """Turns of an object that is put down, for each try, rad."""
 FINGER_TIPS = 0.155
@@ -198,7 +199,7 @@ def offer(tasks: Tasks, row: int, time: float) -> Outcome:
     simulation, state = tasks.simulation, tasks.simulation.state
     ahead = np.array([math.sin(state.yaw[row]), 0.0, math.cos(state.yaw[row])])
     point = state.position_world[row] + OFFER_DISTANCE * ahead
-    point[1] = OFFER_HEIGHT * float(simulation.model.people.stature[row])
+    point[1] = HANDING_HEIGHT * float(simulation.model.people.stature[row])
     hand = hands_of(tasks, row)[0]
     grip = simulation.objects.grip_position[int(tasks.object[row]), hand]
     simulation.reach.start(state, rows_of(row), hand, point, None, grip)
