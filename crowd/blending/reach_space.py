@@ -19,7 +19,15 @@ from crowd.motion.rotation import multiply, rotate
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.reach_blend import LANES, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
-from crowd_kernels.reach_space import BLENDED, CHUNKS, MOST_SAMPLES, SCRATCH, ReachArrays, find_examples_crowd
+from crowd_kernels.reach_space import (
+    BLENDED,
+    CHUNKS,
+    LEAF_POINTS,
+    MOST_SAMPLES,
+    SCRATCH,
+    ReachArrays,
+    find_examples_crowd,
+)
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
@@ -31,8 +39,6 @@ SPACING = 0.041
 BLENDS_PER_ROUND = 256
 """Blends that are tried in each tetrahedron in one round; a round without a hit ends its search."""
 MOST_ROUNDS = 40
-LEAF_POINTS = 8
-"""Most points in a leaf of the k-d tree."""
 MARGIN = 1.0
 """How far beyond the examples places are looked up, m; those farther off are brought in."""
 BODY_RADIUS = 0.17
@@ -367,7 +373,7 @@ def pack(pseudo: Sequence[PseudoExamples], starts: npt.NDArray[np.integer]) -> R
         leaf_start.append(np.concatenate([np.zeros(count, np.int64), leaves + begin]))
     nodes = np.concatenate([[0], np.cumsum([len(entry) for entry in box])[:-1]])
     return ReachArrays(
-        np.ascontiguousarray(np.concatenate(point)),
+        np.ascontiguousarray(np.concatenate(point).T),
         np.concatenate(clip).astype(np.int32),
         np.ascontiguousarray(np.concatenate(weight)),
         np.array([part.point.min(axis=0) - MARGIN for part in pseudo]),

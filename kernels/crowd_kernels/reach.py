@@ -196,9 +196,9 @@ def reach_character(
         In and out: pose row.
     pelvis : (3,) float32
         In and out: pelvis at leg scale 1, m.
-    number : (44,) int32
+    number : (60,) int32
         Scratch.
-    real : (44,) float64
+    real : (60,) float64
         Scratch.
     rows : (256,) float32
         Scratch.
@@ -313,9 +313,9 @@ def reach_crowd(
         s.
     state : ReachState
         In and out.
-    number : (32, 44) int32
+    number : (32, 60) int32
         Scratch.
-    real : (32, 44) float64
+    real : (32, 60) float64
         Scratch.
     rows : (32, 256) float32
         Scratch.

@@ -131,9 +131,9 @@ def look_up(
         Stature over the library's.
     space : ReachArrays
     keys : ReachKeys
-    number : (44,) int32
-        Scratch; examples are written from 32 on.
-    real : (44,) float64
+    number : (60,) int32
+        Scratch; examples are written from `SCRATCH` on.
+    real : (60,) float64
         Scratch; weights likewise.
 
     Returns

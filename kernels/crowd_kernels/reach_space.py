@@ -21,15 +21,20 @@ MOST_SAMPLES = 12
 EXACT = 1e-6
 """Distance at which a point takes all the weight, m."""
 FAR = 1e30
+LEAF_POINTS = 16
+"""Most points in a leaf."""
 STACK = 8
-SCRATCH = 32
+"""Place of the open nodes in the scratch; before it stand the nearest points."""
+LEAF = 32
+"""Place of the distances within a leaf."""
+SCRATCH = LEAF + LEAF_POINTS
 
 
 class ReachArrays(NamedTuple):
     """Sets of pseudo-examples as the kernel reads them; P points of all sets one after the other."""
 
     point: npt.NDArray[np.float64]
-    """(P, 3) Hand position at the apex, m."""
+    """(3, P) Hand position at the apex, m."""
     clip: npt.NDArray[np.int32]
     """(P, 4) Examples that are blended, numbered over all sets."""
     weight: npt.NDArray[np.float64]
@@ -76,9 +81,9 @@ def nearest_points(
         Set.
     x, y, z : float
         Place, m.
-    out_point : (>= 32,) int32
+    out_point : (48,) int32
         Written: the points in the first four; the rest is scratch.
-    out_distance : (>= 32,) float64
+    out_distance : (48,) float64
         Written: their distances, m; the rest is scratch.
 
     Returns
@@ -117,13 +122,18 @@ def nearest_points(
                 out_point[top] = other
                 out_distance[top] = far
                 top += 1
-        for p in range(arrays.leaf_start[root + node], arrays.leaf_start[root + node + 1]):
-            count += 1
-            dx = arrays.point[p, 0] - x
-            dy = arrays.point[p, 1] - y
-            dz = arrays.point[p, 2] - z
-            d = dx * dx + dy * dy + dz * dz
+        first = arrays.leaf_start[root + node]
+        inside = arrays.leaf_start[root + node + 1] - first
+        count += inside
+        for i in range(inside):
+            dx = arrays.point[0, first + i] - x
+            dy = arrays.point[1, first + i] - y
+            dz = arrays.point[2, first + i] - z
+            out_distance[LEAF + i] = dx * dx + dy * dy + dz * dz
+        for i in range(inside):
+            d = out_distance[LEAF + i]
             if d < d3:
+                p = first + i
                 if d < d1:
                     d3, p3, d2, p2 = d2, p2, d1, p1
                     if d < d0:
@@ -161,9 +171,9 @@ def find_examples(
         Set.
     x, y, z : float
         Hand position at the library's size, m.
-    near : (>= 32,) int32
+    near : (48,) int32
         Scratch.
-    distance : (>= 32,) float64
+    distance : (48,) float64
         Scratch.
     out_clip : (>= 12,) int32
         Written: examples, each once.
@@ -227,9 +237,9 @@ def find_examples_crowd(
         Set of each position, 0 to S - 1.
     position : (N, 3) float64
         Hands at the library's size, m.
-    near : (32, 32) int32
+    near : (32, 48) int32
         Scratch of each chunk.
-    distance : (32, 32) float64
+    distance : (32, 48) float64
         Scratch of each chunk.
     out_clip : (N, 12) int32
         Examples.
