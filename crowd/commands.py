@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from crowd.arguments import rotations_of, vectors
 from crowd.controllers.grab import GrabStatus
 from crowd.errors import SettingsError, describe
 from crowd.motion.clip import ClipKind
@@ -48,12 +49,9 @@ class Commands:
             A goal is not finite, is inside an obstacle, or cannot be reached.
         """
         rows = self._rows(characters)
-        goals = np.atleast_2d(np.asarray(goal_world, dtype=np.float64))
+        goals = vectors("set_goal", "goal", goal_world, rows.size, (2, 3))
         if goals.shape[1] == 2:
-            goals = np.stack([goals[:, 0], np.zeros(len(goals)), goals[:, 1]], axis=1)
-        goals = np.broadcast_to(goals, (rows.size, 3))
-        if not np.isfinite(goals).all():
-            raise SettingsError(describe("set_goal", "goal must be finite", allowed="numbers in metres"))
+            goals = np.insert(goals, 1, 0.0, axis=1)
         if not radius > 0:
             raise SettingsError(describe("set_goal", "radius must be positive", radius, "> 0 m"))
         simulation = self._simulation
@@ -85,11 +83,7 @@ class Commands:
             the locomotion hull are realised as the nearest ones inside.
         """
         rows = self._rows(characters)
-        values = np.broadcast_to(np.asarray(parameters, dtype=np.float64), (rows.size, 3))
-        if not np.isfinite(values).all():
-            raise SettingsError(
-                describe("set_locomotion", "parameters must be finite", allowed="m/s, rad/s, m/s")
-            )
+        values = vectors("set_locomotion", "parameter vector", parameters, rows.size)
         state = self._simulation.state
         state.is_directed[rows] = True
         state.directed_parameter[rows] = values
@@ -181,24 +175,21 @@ class Commands:
         if not 0.0 <= trunk <= 1.0:
             raise SettingsError(describe("look_at", "trunk is out of range", trunk, "0 to 1"))
         if point_world is not None:
-            points = np.asarray(point_world, np.float64)
-            if points.shape not in ((3,), (rows.size, 3)):
-                raise SettingsError(
-                    describe(
-                        "look_at", "point has the wrong shape", points.shape, f"(3,) or ({rows.size}, 3)"
-                    )
-                )
+            points = vectors("look_at", "point", point_world, rows.size, must_be_finite=False)
             gaze.look_at_point(state, rows, points, trunk)
         elif character is not None:
             others = self._rows(np.atleast_1d(np.asarray(character)))
-            gaze.look_at_character(state, rows, others if others.size > 1 else others[0], trunk)
+            self._require_one_or_all("look_at", "characters", others.size, rows.size)
+            gaze.look_at_character(state, rows, others, trunk)
         else:
             assert object is not None
             objects = self._simulation.model.objects
             index = np.asarray(objects.index(object) if isinstance(object, str) else object)
-            if ((index < 0) | (index >= objects.count)).any():
+            is_number = np.issubdtype(index.dtype, np.integer)
+            if not is_number or ((index < 0) | (index >= objects.count)).any():
                 known = f"0 to {objects.count - 1}" if objects.count else "the scenario has no objects"
                 raise SettingsError(describe("look_at", "no such object", index.tolist(), known))
+            self._require_one_or_all("look_at", "objects", index.size, rows.size)
             gaze.look_at_object(state, rows, index, trunk)
 
     def set_attention(self, characters: Characters, attention: str) -> None:
@@ -245,26 +236,17 @@ class Commands:
             A target is of the wrong shape, a hand is unknown, or a time is out of range.
         """
         rows, simulation = self._rows(characters), self._simulation
-        targets = np.asarray(target_world, np.float64)
-        if targets.shape not in ((3,), (rows.size, 3)):
-            raise SettingsError(
-                describe("reach", "target has the wrong shape", targets.shape, f"(3,) or ({rows.size}, 3)")
-            )
+        targets = vectors("reach", "target", target_world, rows.size, must_be_finite=False)
         if seconds is not None and not 0.0 < seconds < math.inf:
             raise SettingsError(describe("reach", "seconds are out of range", seconds, "> 0 s"))
         if hold is not None and not hold >= 0.0:
             raise SettingsError(describe("reach", "hold is out of range", hold, ">= 0 s"))
-        rotations = None if rotation_world is None else np.asarray(rotation_world, np.float64)
-        if rotations is not None:
-            if rotations.shape not in ((4,), (rows.size, 4)):
-                raise SettingsError(
-                    describe(
-                        "reach", "rotation has the wrong shape", rotations.shape, f"(4,) or ({rows.size}, 4)"
-                    )
-                )
+        rotations = None
+        if rotation_world is not None:
+            rotations = vectors("reach", "rotation", rotation_world, rows.size, (4,), must_be_finite=False)
             length = np.linalg.norm(rotations, axis=-1, keepdims=True)
             rotations = rotations / np.where(length > 0.0, length, 1.0)
-        hands = self._hands("reach", rows, hand, np.broadcast_to(targets, (rows.size, 3)))
+        hands = self._hands("reach", rows, hand, targets)
         simulation.reach.start(simulation.state, rows, hands, targets, rotations, seconds=seconds, hold=hold)
 
     def end_reach(self, characters: Characters, hand: str | None = None) -> None:
@@ -307,6 +289,10 @@ class Commands:
     def touch(self, characters: Characters, item: int | str, hand: str | None = None) -> None:
         """Let characters lay a hand on an object until `let_go`; arguments as in `grasp`."""
         rows, index, simulation = self._rows(characters), self._item("touch", item), self._simulation
+        if hand == "both":
+            for side in range(len(HANDS)):
+                simulation.grab.touch(simulation.state, rows, side, index)
+            return
         hands = self._hands("touch", rows, hand, simulation.objects.position_world[index])
         simulation.grab.touch(simulation.state, rows, hands, index)
 
@@ -330,24 +316,16 @@ class Commands:
         Raises
         ------
         SettingsError
-            A position is of the wrong shape or not finite.
+            A position or rotation is of the wrong shape or not finite.
         """
         rows, simulation = self._rows(characters), self._simulation
         state, objects = simulation.state, simulation.objects
-        place = np.asarray(position_world, np.float64)
-        if place.shape not in ((3,), (rows.size, 3)):
-            raise SettingsError(
-                describe("put", "position has the wrong shape", place.shape, f"(3,) or ({rows.size}, 3)")
-            )
-        if not np.isfinite(place).all():
-            raise SettingsError(describe("put", "position is not finite", place.tolist(), "m"))
-        place = np.broadcast_to(place, (rows.size, 3))
+        place = vectors("put", "position", position_world, rows.size)
+        wanted = None if rotation_world is None else rotations_of("put", rotation_world, rows.size)
         for side in range(len(HANDS)):
             items = np.maximum(state.grab_object[rows, side], 0)
             turn = objects.rotation_world[items] if objects.count else np.zeros((rows.size, 4))
-            if rotation_world is not None:
-                turn = np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))
-            simulation.grab.put(state, rows, side, place, turn)
+            simulation.grab.put(state, rows, side, place, turn if wanted is None else wanted)
 
     def let_go(
         self,
@@ -365,11 +343,18 @@ class Commands:
             Both when left out.
         position_world, rotation_world : (3,) or (M, 3), and (4,) or (M, 4) array, optional
             Where the object was to be put, m: taken over exactly where it is within a centimetre of it.
+
+        Raises
+        ------
+        SettingsError
+            A position or rotation is of the wrong shape or not finite, or there is no such hand.
         """
         rows, simulation = self._rows(characters), self._simulation
+        place = None if position_world is None else vectors("let_go", "position", position_world, rows.size)
+        turn = None if rotation_world is None else rotations_of("let_go", rotation_world, rows.size)
         for name in HANDS if hand is None else (hand,):
             side = self._hand("let_go", name)
-            simulation.grab.release(simulation.state, rows, side, position_world, rotation_world)
+            simulation.grab.release(simulation.state, rows, side, place, turn)
             simulation.reach.end(simulation.state, rows, side)
 
     def hand_over(self, giver: int, taker: int) -> None:
@@ -378,15 +363,15 @@ class Commands:
         Raises
         ------
         SettingsError
-            The giver holds nothing.
+            The giver holds nothing, or one of them is nobody.
         """
         simulation = self._simulation
         state, objects = simulation.state, simulation.objects
+        both = self._rows([giver, taker])
         held = np.flatnonzero(objects.holder == giver)
         if held.size == 0:
             raise SettingsError(describe("hand_over", "the giver holds nothing", giver))
         item = int(held[0])
-        both = self._rows([giver, taker])
         place = state.position_world[both].mean(axis=0)
         place[1] = HANDING_HEIGHT * float(simulation.model.people.stature[both].mean())
         side = int(np.argmax(objects.holder_hand[item]))
@@ -400,7 +385,7 @@ class Commands:
         objects = self._simulation.model.objects
         if isinstance(item, str):
             return objects.index(item)
-        if not 0 <= item < objects.count:
+        if not isinstance(item, int | np.integer) or not 0 <= item < objects.count:
             allowed = f"0 to {objects.count - 1}" if objects.count else "the scenario has no objects"
             raise SettingsError(describe(what, "no such object", item, allowed))
         return item
@@ -449,6 +434,12 @@ class Commands:
                 )
         for row in rows:
             own.give(int(row), arrays)
+
+    def _require_one_or_all(self, what: str, targets: str, count: int, characters: int) -> None:
+        if count not in (1, characters):
+            raise SettingsError(
+                describe(what, f"wrong number of {targets} to look at", count, f"1 or {characters}")
+            )
 
     def _rows(self, characters: Characters) -> npt.NDArray[np.int32]:
         capacity = self._simulation.state.capacity

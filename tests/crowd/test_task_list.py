@@ -189,3 +189,45 @@ def test_whoever_waits_is_told_when_the_other_gives_up(tmp_path):
         (1, "hand_over", "the hands are empty"),
         (0, "take_from", 'ben has no task hand_over = "ann"'),
     ]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda do: do.let_go(0, position_world=(1, 2)), r"let_go: position has the wrong shape; got \(2,\)"),
+        (lambda do: do.let_go(0, position_world="there"), "let_go: position is not numbers; got 'there'"),
+        (lambda do: do.let_go(0, position_world=[1, [2], 3]), "let_go: position is not numbers"),
+        (lambda do: do.let_go(0, "foot"), "let_go: unknown hand; got 'foot'; allowed right or left"),
+        (lambda do: do.let_go(0, None, (1, 1, 1), (1.0, 0.0)), "let_go: rotation has the wrong shape"),
+        (lambda do: do.put(0, (1, 1, 1), (0.0, 0.0, 0.0, 0.0)), "put: rotation has no length"),
+        (lambda do: do.put(0, (1, 1, 1), (float("nan"), 0, 0, 0)), "put: rotation is not finite"),
+        (lambda do: do.set_goal(0, 3.0), r"set_goal: goal has the wrong shape; got \(\); allowed \(2,\) or"),
+        (lambda do: do.set_goal(0, (1.0, float("inf"))), "set_goal: goal is not finite"),
+        (lambda do: do.set_locomotion(0, (1.0, 0.0)), "set_locomotion: parameter vector has the wrong shape"),
+        (lambda do: do.set_locomotion(0, "fast"), "set_locomotion: parameter vector is not numbers"),
+        (lambda do: do.look_at(0, "ann"), "look_at: point is not numbers"),
+        (lambda do: do.look_at(0, character=[0, 0]), "look_at: wrong number of characters to look at; got 2"),
+        (lambda do: do.look_at(0, object=0.5), "look_at: no such object; got 0.5"),
+        (lambda do: do.look_at(0, object="cap"), 'no object has this name; got \'cap\'; allowed "cup_1"'),
+        (lambda do: do.reach(0, "cup"), "reach: target is not numbers"),
+        (lambda do: do.touch(0, "cup_1", "foot"), "touch: unknown hand; got 'foot'"),
+        (lambda do: do.grasp(0, 7), "grasp: no such object; got 7; allowed 0 to 0"),
+        (lambda do: do.grasp(0, 0.5), "grasp: no such object; got 0.5"),
+        (lambda do: do.hand_over(0, 5), "characters: no such row; got 5"),
+        (lambda do: do.hand_over(0, 0), "hand_over: the giver holds nothing"),
+        (lambda do: do.set_attention(0, "bored"), "'bored'"),
+        (lambda do: do.play(0, "nod", repetitions=0), "play: length must be positive"),
+        (lambda do: do.end_reach(0, "foot"), "end_reach: unknown hand"),
+    ],
+)
+def test_wrong_arguments_of_commands_are_one_line(tmp_path, call, message):
+    simulation = load(tmp_path, "{ wait = 0.1 }")
+    with pytest.raises(SettingsError, match=message) as caught:
+        call(simulation.commands)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_both_hands_can_touch(tmp_path):
+    simulation = load(tmp_path, "{ wait = 0.1 }")
+    simulation.commands.touch(0, "cup_1", "both")
+    assert simulation.state.grab_object[0].tolist() == [0, 0]

@@ -150,3 +150,11 @@ def test_a_library_without_the_clips_of_tasks_is_refused_before_the_run(tmp_path
     fewer = replace(library, clips=tuple(clip for clip in library.clips if clip.name != "carry_left"))
     with pytest.raises(MotionError, match="no clip has this name; got 'carry_left'; allowed"):
         scene(tmp_path, person("ann", 0.0, 0.0, "{ wait = 1.0 }"), motions=fewer)
+
+
+@pytest.mark.parametrize("x", [-1.2, 0.1, 1.3])
+def test_people_walk_to_the_part_of_furniture_that_is_nearest(tmp_path, x):
+    simulation = scene(tmp_path, person("ann", x, 0.0, '{ walk_to = "table" }'))
+    finish(simulation, 30.0)
+    assert abs(simulation.state.position_world[0, 0] - x) < 0.35
+    assert 1.2 < simulation.state.position_world[0, 2] < 2.0

@@ -1,0 +1,65 @@
+"""Vectors and rotations that programs give to commands, checked."""
+
+import numpy as np
+import numpy.typing as npt
+
+from crowd.errors import SettingsError, describe
+
+
+def vectors(
+    what: str,
+    name: str,
+    value: npt.ArrayLike,
+    count: int,
+    lengths: tuple[int, ...] = (3,),
+    *,
+    must_be_finite: bool = True,
+) -> npt.NDArray[np.float64]:
+    """Read one vector for all characters or one for each.
+
+    Parameters
+    ----------
+    what, name : str
+        Command and argument, for messages.
+    value : (L,) or (M, L) array
+    count : int
+        M, characters.
+    lengths : tuple of int
+        What L may be.
+    must_be_finite : bool
+        Otherwise the layers tell by a status what cannot be gone to.
+
+    Returns
+    -------
+    (M, L) float64
+
+    Raises
+    ------
+    SettingsError
+        It is not numbers, of another shape, or not finite.
+    """
+    allowed = " or ".join(f"({length},) or ({count}, {length})" for length in lengths)
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise SettingsError(describe(what, f"{name} is not numbers", str(value), allowed)) from None
+    if array.shape not in [shape for length in lengths for shape in ((length,), (count, length))]:
+        raise SettingsError(describe(what, f"{name} has the wrong shape", array.shape, allowed))
+    if must_be_finite and not np.isfinite(array).all():
+        raise SettingsError(describe(what, f"{name} is not finite", array.tolist(), "finite numbers"))
+    return np.broadcast_to(array, (count, array.shape[-1]))
+
+
+def rotations_of(what: str, value: npt.ArrayLike, count: int) -> npt.NDArray[np.float64]:
+    """Read one rotation (w, x, y, z) for all characters or one for each, as unit quaternions. (M, 4)
+
+    Raises
+    ------
+    SettingsError
+        As `vectors`, or it has no length.
+    """
+    quaternion = vectors(what, "rotation", value, count, (4,))
+    length = np.linalg.norm(quaternion, axis=1, keepdims=True)
+    if not (length > 0.0).all():
+        raise SettingsError(describe(what, "rotation has no length", [0.0] * 4, "(w, x, y, z)"))
+    return np.asarray(quaternion / length)
