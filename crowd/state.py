@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.reach_blend import SLOTS
+from crowd_kernels.reach_correction import LANES as CORRECTED_JOINTS
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -234,6 +235,9 @@ class State:
     """Where the pelvis was then, m. (character, 2, 3)"""
     reach_looked_up_share: FloatArray = _array(2)
     """Share of the upper body's examples then, 0 to 1. (character, 2)"""
+    reach_correction: Float32Array = _array(3 * CORRECTED_JOINTS, dtype=np.float32)
+    """What inverse kinematics turned joints against the blended motion in the last step: vector parts, x of
+    all joints of the tree, then y, z; 0 for none. (character, 96)"""
 
     grab_stage: ByteArray = _array(2, dtype=np.uint8)
     """Stage of each hand, right and left: 0 open, 1 closing, 2 holding, 3 opening. (character, 2)"""

@@ -1,5 +1,6 @@
 """Layer 5, reach: hands go to targets by blended examples, exact by inverse kinematics."""
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,9 +22,11 @@ from crowd.motion.skeleton import Segment, Skeleton
 from crowd.people import shoulders_world
 from crowd.state import FloatArray, IntArray, State
 from crowd.world import World
+from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
 from crowd_kernels.reach import CHUNKS, reach_crowd
 from crowd_kernels.reach_blend import ROW
+from crowd_kernels.reach_correction import keep_corrections, start_solves
 from crowd_kernels.reach_goal import (
     MOVE,
     MOVING,
@@ -47,19 +50,10 @@ REACH_LIMITS = ReachLimits(
     turn_back=5.0,
     lead=0.8,
     rotation_rate=3.0,
-    farthest=0.13,
+    farthest=0.11,
     example_rate=22.0,
 )
-SOLVE = SETTINGS._replace(
-    # Solves start from their reference, near to which shortest steps stay by themselves; a pull would only
-    # push the hand off its target again in each iteration.
-    pull=0.0,
-    reach=1e3,
-    damping=0.03,
-    distance_tolerance=1e-4,
-    angle_tolerance=2e-3,
-    most_iterations=40,
-)
+SOLVE = SETTINGS._replace(reach=1e3, damping=0.028, error_damping=0.4, place_first=0)
 EFFECTORS = ("right_hand", "left_hand")
 FEWEST_EXAMPLES = 8
 """A library with fewer reaches of a hand takes the built-in ones."""
@@ -72,11 +66,31 @@ class ReachSettings:
     limits: ReachLimits = REACH_LIMITS
     """How hands go from target to target; larger accelerations follow moving targets more closely."""
     solve: SolveSettings = SOLVE
-    """How inverse kinematics brings hands to their targets; tighter tolerances: smoother, slower."""
+    """How inverse kinematics brings hands to their targets, for iterations of `iteration_time`."""
+    iteration_time: float = 1.0 / 120.0
+    """Longest time that one iteration serves, s. The same number in every step keeps motions smooth."""
+    fade_rate: float = 8.0
+    """Rate with which turns of joints fade that the targets do not ask for, 1/s."""
+    limit_rate: float = 8.0
+    """Rate with which joints approach their limits at most, 1/s; larger: harder stops."""
     tolerance: float = 7e-4
     """m. A hand at this distance has reached its target; layers above leave up to 0.3 mm more."""
     angle_tolerance: float = 0.0174533
     """rad. Likewise for its rotation."""
+
+    def solve_for(self, dt: float) -> SolveSettings:
+        """Settings of the solves in steps of `dt` s: motions are the same with any step."""
+        iterations = math.ceil(dt / self.iteration_time - 1e-9)
+        time = dt / iterations
+        stiffness = self.iteration_time / time
+        return self.solve._replace(
+            damping=self.solve.damping * math.sqrt(stiffness),
+            error_damping=self.solve.error_damping * stiffness,
+            pull=1.0 - math.exp(-self.fade_rate * time),
+            approach=1.0 - math.exp(-self.limit_rate * time),
+            least_iterations=iterations,
+            most_iterations=iterations,
+        )
 
 
 class Reach:
@@ -84,6 +98,7 @@ class Reach:
 
     state_fields: ClassVar[tuple[str, ...]] = (
         "reach_is_blocked",
+        "reach_correction",
         *(f"reach_{name}" for name in ReachState._fields),
     )
 
@@ -109,6 +124,7 @@ class Reach:
         self._rows = np.zeros((CHUNKS, 2 * ROW), np.float32)
         length = scratch_length(len(self._tree.joint), len(EFFECTORS), len(Segment))
         self._solve_scratch = np.zeros((CHUNKS, length), np.float32)
+        self._solution = np.zeros((capacity, 4 * PADDED_JOINTS), np.float32)
         self._task = np.zeros((capacity, 2), np.uint8)
         self._point = np.zeros((capacity, 2, 3), np.float32)
         self._target = np.zeros((capacity, 2, 3), np.float32)
@@ -131,6 +147,7 @@ class Reach:
         """Start people with hanging arms."""
         state.reach_stage[characters] = NONE
         state.reach_status[characters] = NONE
+        state.reach_correction[characters] = 0.0
 
     def start(
         self,
@@ -182,6 +199,8 @@ class Reach:
         place = state.reach_target_world[characters, hands]
         is_finite = np.isfinite(place).all(axis=1)
         is_new = state.reach_stage[characters, hands] == NONE
+        rests = (state.reach_stage[characters] == NONE).all(axis=1)
+        state.reach_correction[characters[rests]] = 0.0
         state.reach_status[characters, hands] = np.where(is_finite, MOVING, REFUSED)
         going = ~is_new | is_finite
         state.reach_stage[characters[going], hands[going]] = MOVE
@@ -278,10 +297,22 @@ class Reach:
             self._target_rotation,
         )
         blended = time.perf_counter()
+        self._solve(state, reaching, step.dt)
+        self.part_seconds["blending"] += blended - begin
+        self.part_seconds["inverse kinematics"] += time.perf_counter() - blended
+        self._report(state, reaching, step.dt, parts)
+        refused = begins & (state.reach_status == REFUSED)
+        state.reach_stage[refused] = NONE
+        for name in ("course", "course_rate", "weight"):
+            getattr(state, f"reach_{name}")[refused] = 0.0
+
+    def _solve(self, state: State, reaching: IntArray, dt: float) -> None:
+        """Bring hands to their targets, from the blended poses turned as the last solutions were."""
         np.copyto(self._point, state.reach_point_hand, casting="same_kind")
+        start_solves(self._tree, state.reach_correction, state.pose_rotation, reaching, self._solution)
         solve_crowd(
             self._tree,
-            settings.solve,
+            self.settings.solve_for(dt),
             self._segment_scale,
             self._task,
             self._point,
@@ -291,20 +322,14 @@ class Reach:
             state.pose_pelvis,
             reaching,
             self._solve_scratch,
-            state.pose_rotation,
+            self._solution,
             state.pose_pelvis,
             self._status,
             self._distance,
             self._angle,
             self._iterations,
         )
-        self.part_seconds["blending"] += blended - begin
-        self.part_seconds["inverse kinematics"] += time.perf_counter() - blended
-        self._report(state, reaching, step.dt, parts)
-        refused = begins & (state.reach_status == REFUSED)
-        state.reach_stage[refused] = NONE
-        for name in ("course", "course_rate", "weight"):
-            getattr(state, f"reach_{name}")[refused] = 0.0
+        keep_corrections(self._tree, self._solution, reaching, state.pose_rotation, state.reach_correction)
 
     def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:
         """Tell how the reaches stand."""

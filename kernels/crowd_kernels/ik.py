@@ -141,7 +141,8 @@ class SolveSettings(NamedTuple):
     damping: float
     """Least damping, m."""
     error_damping: float
-    """Share of the position step's square that is added to the square of the damping."""
+    """Its product with the position step is added to the square of the damping, m. An arm that is stretched
+    towards a target beyond it swings to and fro where this is smaller than its forearm."""
     pull: float
     """Share of the way to the reference pose that each iteration takes."""
     pull_step: float
@@ -166,13 +167,15 @@ class SolveSettings(NamedTuple):
     """Iterations after which a solve ends."""
     passes: int
     """Solves of one iteration in which joints at their limits are fixed, 1 and more."""
+    approach: float
+    """Largest share of the way to a limit that a joint goes in one iteration."""
     patience: float
     """Iterations with less than 1 % of progress after which a solve ends."""
 
 
 SETTINGS = SolveSettings(
     damping=0.02,
-    error_damping=0.5,
+    error_damping=0.2,
     pull=0.1,
     pull_step=0.087,
     place_step=0.2,
@@ -185,6 +188,7 @@ SETTINGS = SolveSettings(
     least_iterations=0,
     most_iterations=100,
     passes=4,
+    approach=1.0,
     patience=12.0,
 )
 
@@ -480,13 +484,21 @@ def build_system(
 
 @kernel
 def turn_joints(
-    tree: TreeArrays, joints: Any, effectors: Any, push: Any, running: Any, out_violations: Any
+    tree: TreeArrays,
+    approach: Any,
+    joints: Any,
+    effectors: Any,
+    push: Any,
+    running: Any,
+    out_violations: Any,
 ) -> None:
     """Find the next rotations of all joints, and fix those that would leave their limits.
 
     Parameters
     ----------
     tree : TreeArrays
+    approach : float32
+        See `SolveSettings`.
     joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
     effectors : (E, EFFECTOR_ROW) float32
@@ -517,6 +529,7 @@ def turn_joints(
                 tree.is_free[k, 0],
                 tree.is_free[k, 1],
                 tree.is_free[k, 2],
+                approach,
                 running,
                 joints[k + 1],
                 out_violations,
@@ -612,7 +625,7 @@ def solve_block(
                 )
             build_system(tree, parts, joints, effectors, system[:used], push)
             solve_system(parts * count, parts, damping, system, push)
-            turn_joints(tree, joints, effectors, push, running, error)
+            turn_joints(tree, np.float32(settings.approach), joints, effectors, push, running, error)
             if sum_row(error) == ZERO:
                 break
         for k in range(tree.joint.shape[0]):
@@ -961,7 +974,9 @@ def solve_crowd(
 
     **Source:** Feng, Xu, Shapiro, "An example-based motion synthesis technique for locomotion and object
     manipulation", 2012, section 5.2; clamping of joints: Baerlocher, Boulic, "An inverse kinematics
-    architecture enforcing an arbitrary number of strict priority levels", 2004.
+    architecture enforcing an arbitrary number of strict priority levels", 2004; approach to limits: Faverjon,
+    Tournassoud, "A local based approach for path planning of manipulators with a high number of degrees of
+    freedom", 1987.
     **Differs from the source:** the pseudo-inverse is damped, and more so far from the target; joints are
     balls that are fixed along one direction at a time where they leave their limits, and they have weights.
     """

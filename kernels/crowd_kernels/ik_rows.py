@@ -331,7 +331,7 @@ def effector_row(
     tolerances : tuple of float32
         What counts as reached, m and rad.
     damping : float32
-        Share of the square of the position step that is added to the damping.
+        Length whose product with the position step is added to the damping, m.
     row : (EFFECTOR_ROW,) float32
         The effector: tip, miss, distance, angle, `IS_FAR` and `TURNS` are written.
     out_totals : (48,) float32
@@ -361,7 +361,7 @@ def effector_row(
         row[DISTANCE + lane] = distance
         share = min(ONE, steps[0] / distance)
         put_vector(row, MISS, lane, (miss[0] * share, miss[1] * share, miss[2] * share))
-        out_totals[2 * LANES + lane] += damping * square * share * share
+        out_totals[2 * LANES + lane] += damping * distance * share
         turn = multiply(quaternion_at(row, TARGET_FRAME, lane), conjugate(frame))
         square = turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]
         # The angle is twice the arc sine of the vector part.
@@ -761,6 +761,7 @@ def limit_row(
     free_x: Any,
     free_y: Any,
     free_twist: Any,
+    approach: Any,
     is_running: Any,
     row: Any,
     out_violations: Any,
@@ -778,6 +779,8 @@ def limit_row(
         See `LimitArrays.inverse_swing`.
     free_x, free_y, free_twist : float32
         See `LimitArrays.is_free`.
+    approach : float32
+        Largest share of the way to a limit that the joint goes now.
     is_running : (16,) float32
         0 where the character stays as it is.
     row : (JOINT_ROW,) float32
@@ -786,9 +789,16 @@ def limit_row(
         Grows by the number of directions that were fixed.
     """
     for lane in range(LANES):
-        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, ROTATION, lane), joint_frame))
+        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
         bound = row[SWING_BOUND + lane]
+        # Up to a share of the way to the limit, so that joints come to rest there softly.
+        radius = np.sqrt(value) + approach * max(np.sqrt(bound) - np.sqrt(value), ZERO)
+        bound = min(radius * radius, bound)
         low, high = row[TWIST_BOUND + lane], row[TWIST_BOUND + LANES + lane]
+        low = max(low, twist + approach * min(low - twist, ZERO))
+        high = min(high, twist + approach * max(high - twist, ZERO))
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
         held = vector_at(row, HELD, lane)
         value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
         share = np.sqrt(bound / max(value, bound))

@@ -54,7 +54,7 @@ ARITHMETIC_LEAVES |= {
     ik_rows.accumulate_frame_row: (ROW, ROW, ROW, ROW),
     ik_rows.add_torque_row: (ROW, ROW, ROW),
     ik_rows.step_row: (ROW, ROW, ROW),
-    ik_rows.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW),
+    ik_rows.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 6, ROW, ROW, ROW),
     ik_rows.subtract_block: (ROW, ROW, ROW),
 }
 SHUFFLE_LEAVES = {

@@ -140,7 +140,7 @@ def iterate(tree, settings, local, reference, point, target, target_rotation, ta
                 jacobian[6 * e + 3 : 6 * e + 6, 3 * k : 3 * k + 3] = np.eye(3)
     jacobian[~rows] = 0
     damping = settings.damping**2 + settings.error_damping * sum(
-        np.sum(miss[6 * e : 6 * e + 3] ** 2) for e in range(effectors)
+        np.linalg.norm(miss[6 * e : 6 * e + 3]) for e in range(effectors)
     )
     for _ in range(settings.passes):
         weights = np.zeros((3 * count, 3 * count))
@@ -154,7 +154,9 @@ def iterate(tree, settings, local, reference, point, target, target_rotation, ta
             half = outers[k].inv().apply(step[3 * k : 3 * k + 3]) / 2
             after = Rotation.from_quat([*half, 1.0]) * rotation(local[k])
             if tree.is_limited[k] and tree.weight[k] > 0:
-                after, broken = inside(tree, k, quaternion(after), reference[k])
+                after, broken = inside(
+                    tree, k, quaternion(after), reference[k], local[k], settings.approach
+                )
                 way = quaternion(after * rotation(local[k]).inv())
                 motion = outers[k].apply(2 * way[1:] / way[0])
                 gradient = normals(tree, k, quaternion(after), outers[k])
@@ -168,13 +170,20 @@ def iterate(tree, settings, local, reference, point, target, target_rotation, ta
     return np.array(found)
 
 
-def inside(limits, k, local, reference):
-    """Projection of a joint into its limits, and whether swing and twist had to be changed."""
+def inside(limits, k, local, reference, before, approach):
+    """Projection of a joint into what limits leave to it, and whether swing and twist had to be changed."""
     swing, twist = split(limits, k, local)
     held_swing, held_twist = split(limits, k, reference)
     low, high = 2 * np.arctan(np.asarray(limits.twist[k], float))
     low, high = min(low, held_twist), max(high, held_twist)
     bound = max(1.0, np.linalg.norm(held_swing * limits.inverse_swing[k]))
+    swing_before, twist_before = split(limits, k, before)
+    value = np.linalg.norm(swing_before * limits.inverse_swing[k])
+    bound = min(bound, value + approach * max(bound - value, 0))
+    before = np.tan(twist_before / 2)
+    ends = np.tan(np.array([low, high]) / 2)
+    low = 2 * np.arctan(max(ends[0], before + approach * min(ends[0] - before, 0)))
+    high = 2 * np.arctan(min(ends[1], before + approach * max(ends[1] - before, 0)))
     value = np.linalg.norm(swing * limits.inverse_swing[k])
     free_x, free_y, free_twist = limits.is_free[k]
     tangents = np.tan(np.array([low, twist, high]) / 2)

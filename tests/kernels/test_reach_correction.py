@@ -1,0 +1,81 @@
+"""Corrections of reaches: against a slow twin, back and forth, and only for who is active."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crowd.motion.body import build_skeleton
+from crowd.motion.joint_tree import joint_tree
+from crowd_kernels.clip import PADDED_JOINTS
+from crowd_kernels.reach_correction import LANES, keep_corrections, start_solves
+from tests.oracles import reach_correction as oracle
+
+TREE = joint_tree(build_skeleton(), ("right_hand", "left_hand"))
+COUNT = 6
+ACTIVE = np.array([4, 1, 2, 5], np.int32)
+INACTIVE = [0, 3]
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def poses(rng):
+    """Pose rows (N, 256) of random unit quaternions."""
+    q = rng.normal(size=(COUNT, PADDED_JOINTS, 4))
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.ascontiguousarray(np.moveaxis(q, 2, 1).reshape(COUNT, -1).astype(np.float32))
+
+
+def local(row):
+    """Rotations (K, 4) of the tree's joints."""
+    return row.reshape(4, -1)[:, TREE.joint].T.astype(float)
+
+
+def vectors(row):
+    """Corrections (K, 3)."""
+    return row.reshape(3, LANES)[:, : len(TREE.joint)].T.astype(float)
+
+
+@given(SEEDS)
+def test_solves_start_from_the_corrected_blend(seed):
+    rng = np.random.default_rng(seed)
+    pose, start = poses(rng), np.full((COUNT, 4 * PADDED_JOINTS), np.nan, np.float32)
+    correction = rng.uniform(-0.5, 0.5, (COUNT, 3 * LANES)).astype(np.float32)
+    start_solves(TREE, correction, pose, ACTIVE, start)
+    for i in ACTIVE:
+        wanted = oracle.started(TREE, vectors(correction[i]), local(pose[i]))
+        same = np.abs(np.sum(wanted * local(start[i]), axis=1))
+        np.testing.assert_allclose(same, 1.0, atol=1e-6)
+    assert np.isnan(start[INACTIVE]).all()
+
+
+@given(SEEDS)
+def test_what_is_kept_brings_the_blend_to_the_solution_again(seed):
+    rng = np.random.default_rng(seed)
+    solution, pose = poses(rng), poses(rng)
+    before, correction = pose.copy(), np.zeros((COUNT, 3 * LANES), np.float32)
+    keep_corrections(TREE, solution, ACTIVE, pose, correction)
+    turning = TREE.weight > 0
+    for i in ACTIVE:
+        wanted = oracle.kept(TREE, local(solution[i]), local(before[i]))
+        # Half a turn away both signs are as good.
+        clear = np.linalg.norm(wanted, axis=1) < 0.999
+        np.testing.assert_allclose(vectors(correction[i])[clear], wanted[clear], atol=1e-5)
+        np.testing.assert_array_equal(local(pose[i])[turning], local(solution[i])[turning])
+        np.testing.assert_array_equal(local(pose[i])[~turning], local(before[i])[~turning])
+        again = oracle.started(TREE, vectors(correction[i]), local(before[i]))
+        same = np.abs(np.sum(again * local(pose[i]), axis=1))
+        np.testing.assert_allclose(same[clear], 1.0, atol=1e-4)
+    others = np.setdiff1d(np.arange(PADDED_JOINTS), TREE.joint)
+    rows, old = pose.reshape(COUNT, 4, -1), before.reshape(COUNT, 4, -1)
+    np.testing.assert_array_equal(rows[:, :, others], old[:, :, others])
+    np.testing.assert_array_equal(rows[INACTIVE], old[INACTIVE])
+    assert not correction[INACTIVE].any()
+
+
+def test_no_correction_leaves_the_pose_as_it_is(rng):
+    pose, start = poses(rng), np.zeros((COUNT, 4 * PADDED_JOINTS), np.float32)
+    correction = np.zeros((COUNT, 3 * LANES), np.float32)
+    start_solves(TREE, correction, pose, ACTIVE, start)
+    for i in ACTIVE:
+        np.testing.assert_allclose(local(start[i]), local(pose[i]), atol=1e-6)
+    keep_corrections(TREE, pose.copy(), ACTIVE, pose, correction)
+    assert np.abs(correction).max() < 1e-6
