@@ -50,7 +50,7 @@ REACH_LIMITS = ReachLimits(
     turn_back=5.0,
     lead=0.8,
     rotation_rate=3.0,
-    farthest=0.11,
+    farthest=0.13,
     example_rate=22.0,
 )
 SOLVE = SETTINGS._replace(reach=1e3, damping=0.028, error_damping=0.4, place_first=0)
@@ -81,13 +81,13 @@ class ReachSettings:
     def solve_for(self, dt: float) -> SolveSettings:
         """Settings of the solves in steps of `dt` s: motions are the same with any step."""
         iterations = math.ceil(dt / self.iteration_time - 1e-9)
-        time = dt / iterations
-        stiffness = self.iteration_time / time
+        span = dt / iterations
+        stiffness = self.iteration_time / span
         return self.solve._replace(
             damping=self.solve.damping * math.sqrt(stiffness),
             error_damping=self.solve.error_damping * stiffness,
-            pull=1.0 - math.exp(-self.fade_rate * time),
-            approach=1.0 - math.exp(-self.limit_rate * time),
+            pull=1.0 - math.exp(-self.fade_rate * span),
+            approach=1.0 - math.exp(-self.limit_rate * span),
             least_iterations=iterations,
             most_iterations=iterations,
         )

@@ -44,14 +44,18 @@ from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 CHUNKS = 32
 ZERO = np.float32(0.0)
+SPARED = 0.15
+"""Share of its longest way that a hand leaves out for targets twice as far and more."""
 SHARED_TRUNK = 0.3
 """How much farther hands may be from their goals where both share the trunk, m."""
 
 
 @inlined_kernel
 def shortened(vector: Vector, longest: float) -> Vector:
-    """Shorten a vector to a length that it may have at most."""
-    return scaled(vector, min(longest / max(norm(vector), 1e-9), 1.0))
+    """Shorten a way to the longest that inverse kinematics goes, less for what is hopelessly far."""
+    length = max(norm(vector), 1e-9)
+    hopeless = minimum_jerk(min(max(length / longest - 1.0, 0.0), 1.0))
+    return scaled(vector, min(longest * (1.0 - SPARED * hopeless) / length, 1.0))
 
 
 @inlined_kernel

@@ -154,9 +154,7 @@ def iterate(tree, settings, local, reference, point, target, target_rotation, ta
             half = outers[k].inv().apply(step[3 * k : 3 * k + 3]) / 2
             after = Rotation.from_quat([*half, 1.0]) * rotation(local[k])
             if tree.is_limited[k] and tree.weight[k] > 0:
-                after, broken = inside(
-                    tree, k, quaternion(after), reference[k], local[k], settings.approach
-                )
+                after, broken = inside(tree, k, quaternion(after), reference[k], local[k], settings.approach)
                 way = quaternion(after * rotation(local[k]).inv())
                 motion = outers[k].apply(2 * way[1:] / way[0])
                 gradient = normals(tree, k, quaternion(after), outers[k])
