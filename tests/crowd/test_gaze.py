@@ -9,6 +9,7 @@ from crowd.controllers.gaze import Gaze
 from crowd.controllers.gaze_settings import GazeSettings, GlanceSettings
 from crowd.errors import SettingsError
 from crowd.motion.clip import ClipKind
+from crowd.scenario.object_table import ObjectTable
 from crowd.scenario.schema import Area, Character, Goal, Region, Scenario, WorldTable
 from crowd_kernels.gaze import ON_TARGET, REFUSED
 
@@ -67,6 +68,36 @@ def test_the_eyes_of_somebody_who_walks_past_are_followed():
             target = simulation.joint_positions_world()[1, eyes].mean(axis=0)
             assert max(eye_misses(simulation, 0, target)) < 1.0
     assert simulation.state.gaze_status[0] == ON_TARGET
+
+
+@pytest.mark.parametrize("dt", [1 / 30, 1 / 60])
+@pytest.mark.parametrize("walks", [False, True])
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [((-40.0, 0.0), (40.0, 0.0)), ((10.0, -25.0), (10.0, 20.0)), ((30.0, 15.0), (-30.0, -20.0))],
+)
+def test_eyes_stay_on_an_object_that_moves_thirty_degrees_a_second(dt, walks, low, high):
+    goals = (Goal(position=(0, 15)),) if walks else ()
+    ball = ObjectTable(name="ball", shape="sphere", radius=0.05, position=(0, 1.6, 3))
+    people = (Character(position=(0, 0), facing=0, goals=goals),)
+    simulation = crowd.Simulation(Scenario(world=GROUND, characters=people, objects=(ball,), dt=dt), seed=4)
+    state, eye = simulation.state, simulation.model.skeleton.joint("left_eye")
+    simulation.commands.set_attention(0, "none")
+    simulation.commands.look_at(0, object="ball")
+    low, high = np.radians(low), np.radians(high)
+    length = np.degrees(np.linalg.norm(high - low)) / 30.0
+    worst = 0.0
+    for frame in simulation.run(seconds=1.0 + 4.0 * length):
+        if frame.time > 1.0:
+            worst = max(worst, *eye_misses(simulation, 0, simulation.objects.position_world[0]))
+        share = max(frame.time + dt - 1.0, 0.0) / length % 2.0
+        side, up = low + min(share, 2.0 - share) * (high - low)
+        way = [np.sin(side) * np.cos(up), np.sin(up), np.cos(side) * np.cos(up)]
+        height = simulation.joint_positions_world()[0, eye, 1]
+        centre = state.position_world[0] + [0.0, height, 0.0]
+        simulation.objects.position_world[0] = centre + 3.0 * np.array(way)
+    assert worst < 1.0
+    assert state.gaze_status[0] == ON_TARGET
 
 
 def test_what_cannot_be_looked_at_is_refused_by_a_status():
