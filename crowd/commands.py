@@ -121,6 +121,8 @@ class Commands:
                     "play", "locomotion examples are blended, not played", clip_name, "a gesture or idle clip"
                 )
             )
+        if clip.frame_count < 2:
+            raise SettingsError(describe("play", "is a single pose", clip_name, "a gesture or idle clip"))
         length = clip.duration * repetitions if seconds is None else seconds
         if not length > 0 or math.isnan(length):
             raise SettingsError(describe("play", "length must be positive", length, "> 0 s"))

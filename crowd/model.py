@@ -135,5 +135,6 @@ class Model:
 
 
 def playable(library: MotionLibrary) -> list[str]:
-    """Names of the clips that can be played; locomotion examples are blended instead."""
-    return [clip.name for clip in library.clips if clip.kind is not ClipKind.LOCOMOTION]
+    """Names of the clips that can be played: not single poses, nor locomotion examples, which are blended."""
+    clips = [clip for clip in library.clips if clip.frame_count > 1]
+    return [clip.name for clip in clips if clip.kind is not ClipKind.LOCOMOTION]

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from crowd.blending.reach_space import LARGEST_GAP, SIDES, ReachSpace
 from crowd.controllers.controller import Step
 from crowd.motion.clip import Clip
+from crowd.motion.library import MotionLibrary
 from crowd.motion.rotation import conjugate, from_vector, multiply, rotate, to_vector
 from crowd.scenario.schema import Area, Character, Scenario, WorldTable
 from crowd.simulation import Simulation
@@ -76,9 +77,11 @@ class Reachers:
     ----------
     people : int
     seed : int
+    motions : MotionLibrary, optional
+        Whose reaches are blended; the built-in library when left out.
     """
 
-    def __init__(self, people: int, seed: int) -> None:
+    def __init__(self, people: int, seed: int, motions: MotionLibrary | None = None) -> None:
         side = math.ceil(math.sqrt(people))
         rng = np.random.default_rng(seed)
         facing = rng.uniform(-180.0, 180.0, people)
@@ -88,7 +91,7 @@ class Reachers:
         )
         ground = Area(x=(-side - 4.0, side + 4.0), z=(-side - 4.0, side + 4.0))
         scenario = Scenario(name="reach", world=WorldTable(bounds=ground), characters=characters)
-        self.simulation = Simulation(scenario, seed=seed)
+        self.simulation = Simulation(scenario, seed=seed, motions=motions)
         self.rows = np.arange(people, dtype=np.int32)
         self.size = self.simulation.model.people.stature / self.simulation.model.skeleton.stature
         self.index = 0

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 import crowd
+from crowd.bench.reach import Reachers, random_targets
 from crowd.bench.sweep import sweep
+from crowd.cli import exit_code
 from crowd.motion.body import build_skeleton
 from crowd.motion.clip import ClipKind
 from crowd.motion.formats import find_motion_files, read_motions
@@ -20,6 +22,7 @@ from crowd.motion.importing.folder import Request, import_motions
 from crowd.motion.importing.importer import import_clip
 from crowd.motion.importing.labels import write_labels
 from crowd.motion.library_file import load_library, save_library
+from crowd_kernels.reach_goal import REACHED
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 SMARTBODY = DATA / "smartbody"
@@ -303,6 +306,34 @@ def test_what_is_asked_is_realised_over_the_whole_space(reports, name):
     assert result.speed_rms_relative < 0.03
     assert result.turn_rms_deg_s < 1.5
     assert result.drift_mean_m < 0.02
+
+
+@pytest.mark.parametrize(("name", "fewest"), [("reaching", 25), ("MocapReaching", 40)])
+def test_people_reach_by_captured_reaches(name, fewest, tmp_path, rng):
+    out = tmp_path / "reaches.h5"
+    assert exit_code(["motions", "import", str(SMARTBODY / name), "--out", str(out), "--no-calibrate"]) == 0
+    library = load_library(out)
+    sides = [clip.reach.side for clip in library.of_kind(ClipKind.REACH)]
+    assert min(sides.count("right"), sides.count("left")) >= fewest
+    for hand in (0, 1):
+        reachers = Reachers(200, 3, library)
+        reachers.step()
+        wanted = random_targets(reachers, hand, rng, is_far=False)
+        reachers.reach(hand, wanted)
+        # People take as long as the captured ones, up to five seconds.
+        for _ in range(360):
+            reachers.step()
+        state = reachers.simulation.state
+        assert np.isfinite(state.pose_rotation).all()
+        assert (state.reach_status[:, hand] == REACHED).all()
+        assert np.linalg.norm(reachers.hand(hand)[0] - wanted, axis=1).max() < 1e-3
+    simulation = crowd.Simulation(crowd.load_scenario("seated_desk"), motions=library)
+    for _ in simulation.run(seconds=45.0):
+        if simulation.is_finished:
+            break
+    figures = simulation.metrics.as_dict()
+    assert figures["tasks.failed"] == 0
+    assert figures["reach.error_mm.max"] < 1.0
 
 
 def test_sides_that_a_set_lacks_are_mirrored(reports):
