@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from crowd.controllers.controller import Step
 from crowd.errors import SettingsError, describe, nearest_first
-from crowd.motion.joint_tree import joint_tree
+from crowd.motion.joint_tree import joint_trees
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.state import ByteArray, Float32Array, IntArray, State
 from crowd_kernels.hold import aim_holds, apply_holds, hold_effectors
@@ -80,11 +80,7 @@ class Constraint:
     def __init__(self, skeleton: Skeleton, capacity: int, settings: ConstraintSettings | None = None) -> None:
         self.settings = settings or ConstraintSettings()
         count = len(EFFECTORS)
-        self.trees = {
-            mask: self._tree(skeleton, [e for e in range(count) if mask >> e & 1])
-            for mask in range(1, 1 << count)
-        }
-        """Trees of each set of effectors; bit e of the key is set for those with effector e."""
+        self.trees = joint_trees(skeleton, EFFECTORS, weights=self.settings.weights)
         self.tree = self.trees[(1 << count) - 1]
         self._target: Float32Array = np.zeros((capacity, count, 3), np.float32)
         self._target_rotation: Float32Array = np.zeros((capacity, count, 4), np.float32)
@@ -93,11 +89,6 @@ class Constraint:
         self._mask: ByteArray = np.zeros(capacity, np.uint8)
         length = scratch_length(len(self.tree.joint), count, len(Segment))
         self._scratch = np.zeros((CHUNKS, length), np.float32)
-
-    def _tree(self, skeleton: Skeleton, effectors: list[int]) -> TreeArrays:
-        """Build the tree of some effectors, which reads no joints but those of their chains."""
-        names = [EFFECTORS[e] for e in effectors]
-        return joint_tree(skeleton, names, weights=self.settings.weights, columns=effectors)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Hold nothing of people who have just entered."""

@@ -14,7 +14,7 @@ from crowd.blending.reach_space import SIDES, ReachSpace
 from crowd.controllers.controller import Step
 from crowd.motion.body import build_skeleton
 from crowd.motion.clip import Clip, ClipKind
-from crowd.motion.joint_tree import joint_tree
+from crowd.motion.joint_tree import joint_trees
 from crowd.motion.library import MotionLibrary
 from crowd.motion.mirror import mirrored, opposite
 from crowd.motion.procedural.reaching import seated_reaches, standing_reaches
@@ -117,7 +117,8 @@ class Reach:
         self._segment_scale = segment_scale
         self._size = np.ascontiguousarray(stature / library.skeleton.stature)
         self._space: ReachSpace | None = None
-        self._tree = joint_tree(library.skeleton, EFFECTORS)
+        self._trees = joint_trees(library.skeleton, EFFECTORS)
+        self._tree = self._trees[(1 << len(EFFECTORS)) - 1]
         capacity, size = len(stature), SCRATCH + MOST_SAMPLES
         self._number = np.zeros((CHUNKS, size), np.int32)
         self._real = np.zeros((CHUNKS, size))
@@ -309,26 +310,34 @@ class Reach:
     def _solve(self, state: State, reaching: IntArray, dt: float) -> None:
         """Bring hands to their targets, from the blended poses turned as the last solutions were."""
         np.copyto(self._point, state.reach_point_hand, casting="same_kind")
-        start_solves(self._tree, state.reach_correction, state.pose_rotation, reaching, self._solution)
-        solve_crowd(
-            self._tree,
-            self.settings.solve_for(dt),
-            self._segment_scale,
-            self._task,
-            self._point,
-            self._target,
-            self._target_rotation,
-            state.pose_rotation,
-            state.pose_pelvis,
-            reaching,
-            self._solve_scratch,
-            self._solution,
-            state.pose_pelvis,
-            self._status,
-            self._distance,
-            self._angle,
-            self._iterations,
+        start_solves(
+            self._tree, self._task, state.reach_correction, state.pose_rotation, reaching, self._solution
         )
+        settings = self.settings.solve_for(dt)
+        hands = (self._task[reaching] != 0) @ (1 << np.arange(len(EFFECTORS)))
+        for mask, tree in self._trees.items():
+            rows = reaching[hands == mask]
+            if rows.size == 0:
+                continue
+            solve_crowd(
+                tree,
+                settings,
+                self._segment_scale,
+                self._task,
+                self._point,
+                self._target,
+                self._target_rotation,
+                state.pose_rotation,
+                state.pose_pelvis,
+                rows,
+                self._solve_scratch,
+                self._solution,
+                state.pose_pelvis,
+                self._status,
+                self._distance,
+                self._angle,
+                self._iterations,
+            )
         keep_corrections(self._tree, self._solution, reaching, state.pose_rotation, state.reach_correction)
 
     def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:

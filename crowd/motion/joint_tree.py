@@ -1,6 +1,7 @@
 """Trees of a skeleton's joints for inverse kinematics: from a root joint to the effectors."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -104,6 +105,29 @@ def joint_tree(
         component_step=PADDED_JOINTS,
         joint_step=1,
     )
+
+
+def joint_trees(skeleton: Skeleton, effectors: Sequence[str], **options: Any) -> dict[int, TreeArrays]:
+    """Build the tree of each set of some effectors, which reads no joints but those of their chains.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    effectors : sequence of str
+        Names of the joints that carry effectors.
+    **options
+        See `joint_tree`.
+
+    Returns
+    -------
+    dict of int to TreeArrays
+        Bit e of a key is set for the sets with effector e. All write their effectors to the same columns.
+    """
+    trees = {}
+    for mask in range(1, 1 << len(effectors)):
+        own = [e for e in range(len(effectors)) if mask >> e & 1]
+        trees[mask] = joint_tree(skeleton, [effectors[e] for e in own], columns=own, **options)
+    return trees
 
 
 def chain_above(skeleton: Skeleton, joint: int) -> list[int]:

@@ -43,16 +43,27 @@ def set_joint_rotation(tree: TreeArrays, k: int, rotation: Quaternion, out_row: 
     out_row[index + 3 * step] = rotation[3]
 
 
+@inlined_kernel
+def is_asked(tree: TreeArrays, task: Any, k: int) -> bool:
+    """Tell whether a joint moves an effector that has a task."""
+    asked = False
+    for e in range(tree.effector.shape[0]):
+        asked |= tree.moves[e, k] != 0 and task[tree.column[e]] != 0
+    return asked
+
+
 @parallel_kernel
 def start_solves(
-    tree: TreeArrays, correction: Any, pose_rotation: Any, active: Any, out_rotation: Any
+    tree: TreeArrays, task: Any, correction: Any, pose_rotation: Any, active: Any, out_rotation: Any
 ) -> None:
     """Turn blended poses by the last corrections: where the next solves start.
 
     Parameters
     ----------
     tree : TreeArrays
-        K joints, at most 32.
+        K joints, at most 32, of all effectors.
+    task : (N, >= E) uint8
+        What is asked of each effector, 0 for nothing. Joints that move none with a task are not corrected.
     correction : (N, 96) float32
         Vector part of the last correction: component c of the tree's joint k stands at 32 c + k.
     pose_rotation : (N, L) float32
@@ -76,7 +87,7 @@ def start_solves(
             row = correction[character]
             for k in range(tree.joint.shape[0]):
                 rotation = joint_rotation(tree, k, pose_rotation[character])
-                if tree.weight[k] > ZERO:
+                if is_asked(tree, task[character], k):
                     x, y, z = row[k], row[LANES + k], row[2 * LANES + k]
                     w = np.sqrt(max(ONE - x * x - y * y - z * z, ZERO))
                     rotation = unit_quaternion(multiply((w, x, y, z), rotation))

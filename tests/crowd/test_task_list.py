@@ -208,7 +208,7 @@ def test_whoever_waits_is_told_when_the_other_gives_up(tmp_path):
         (lambda do: do.look_at(0, "ann"), "look_at: point is not numbers"),
         (lambda do: do.look_at(0, character=[0, 0]), "look_at: wrong number of characters to look at; got 2"),
         (lambda do: do.look_at(0, object=0.5), "look_at: no such object; got 0.5"),
-        (lambda do: do.look_at(0, object="cap"), 'no object has this name; got \'cap\'; allowed "cup_1"'),
+        (lambda do: do.look_at(0, object="cap"), "no object has this name; got 'cap'; allowed \"cup_1\""),
         (lambda do: do.reach(0, "cup"), "reach: target is not numbers"),
         (lambda do: do.touch(0, "cup_1", "foot"), "touch: unknown hand; got 'foot'"),
         (lambda do: do.grasp(0, 7), "grasp: no such object; got 7; allowed 0 to 0"),

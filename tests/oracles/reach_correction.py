@@ -5,10 +5,10 @@ import numpy as np
 from tests.oracles.ik import quaternion, rotation
 
 
-def started(tree, vector, local):
-    """Local rotations (K, 4) of a blended pose, turned by corrections (K, 3)."""
+def started(tree, task, vector, local):
+    """Local rotations (K, 4) of a blended pose, turned by corrections (K, 3) where a task (E,) is near."""
     result = np.array(local, float)
-    for k in np.flatnonzero(tree.weight > 0):
+    for k in np.flatnonzero(tree.moves[np.array(task) != 0].any(axis=0)):
         scalar = np.sqrt(max(1 - vector[k] @ vector[k], 0))
         result[k] = quaternion(rotation([scalar, *vector[k]]) * rotation(local[k]))
     return result
