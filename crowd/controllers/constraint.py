@@ -28,7 +28,13 @@ from crowd_kernels.reach_goal import HOLD
 EFFECTORS = ("right_hand", "left_hand", "head")
 """Joints that can be held, in the order of the state's effector axis: hands as everywhere, then the head."""
 FOLLOWING = SETTINGS._replace(
-    damping=0.01, pull=1.0, place_first=0, distance_tolerance=3e-4, least_iterations=2, most_iterations=4
+    damping=0.01,
+    pull=1.0,
+    pull_fade=1.0,
+    place_first=0,
+    distance_tolerance=3e-4,
+    least_iterations=2,
+    most_iterations=4,
 )
 """Two iterations let the pose follow; more are made where they leave effectors beyond the tolerances."""
 ORIGIN: Float32Array = np.zeros(3, np.float32)

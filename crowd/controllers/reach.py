@@ -53,7 +53,7 @@ REACH_LIMITS = ReachLimits(
     farthest=0.13,
     example_rate=22.0,
 )
-SOLVE = SETTINGS._replace(reach=1e3, damping=0.016, error_damping=0.4, place_first=0)
+SOLVE = SETTINGS._replace(reach=1e3, damping=0.016, error_damping=0.4, pull_fade=1.0, place_first=0)
 EFFECTORS = ("right_hand", "left_hand")
 FEWEST_EXAMPLES = 8
 """A library with fewer reaches of a hand takes the built-in ones."""

@@ -144,7 +144,10 @@ class SolveSettings(NamedTuple):
     """Its product with the position step is added to the square of the damping, m. An arm that is stretched
     towards a target beyond it swings to and fro where this is smaller than its forearm."""
     pull: float
-    """Share of the way to the reference pose that each iteration takes."""
+    """Share of the way to the reference pose that the first iteration takes."""
+    pull_fade: float
+    """Factor of `pull` from one iteration to the next. A pull that stays moves effectors off their targets
+    again to second order, and long solves do not end."""
     pull_step: float
     """Largest rotation towards the reference pose in one iteration, rad."""
     place_step: float
@@ -177,6 +180,7 @@ SETTINGS = SolveSettings(
     damping=0.02,
     error_damping=0.2,
     pull=0.1,
+    pull_fade=0.8,
     pull_step=0.087,
     place_step=0.2,
     turn_step=0.5,
@@ -389,18 +393,19 @@ def frame_of(frames: Any, k: int) -> tuple[Any, Any, Any, Any]:
 
 
 @kernel
-def free_joints(tree: TreeArrays, settings: SolveSettings, joints: Any) -> None:
+def free_joints(tree: TreeArrays, gain: Any, bound: Any, joints: Any) -> None:
     """Set drift and mobility of all joints of a block for a new iteration.
 
     Parameters
     ----------
     tree : TreeArrays
-    settings : SolveSettings
+    gain : float32
+        Share of the way to the reference pose.
+    bound : float32
+        Largest rotation towards it, rad.
     joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
     """
-    gain = np.float32(settings.pull)
-    bound = np.float32(settings.pull_step)
     for k in range(tree.joint.shape[0]):
         if tree.weight[k] <= ZERO:
             continue
@@ -590,6 +595,7 @@ def solve_block(
         running[lane] = ONE
         iterations[lane] = ZERO
         stalled[lane] = ZERO
+    pull = np.float32(settings.pull)
     for iteration in range(settings.most_iterations + 1):
         place_joints(tree, scale, joints)
         for lane in range(LANES):
@@ -614,12 +620,12 @@ def solve_block(
         if sum_row(running) == ZERO or iteration == settings.most_iterations:
             break
         add_row(running, iterations)
-        free_joints(tree, settings, joints)
+        free_joints(tree, pull, np.float32(settings.pull_step), joints)
         for _ in range(settings.passes):
             if root_weight > ZERO:
                 root_pull_row(
                     root_reference,
-                    np.float32(settings.pull),
+                    pull,
                     np.float32(settings.place_step),
                     joints[0],
                 )
@@ -628,6 +634,7 @@ def solve_block(
             turn_joints(tree, np.float32(settings.approach), joints, effectors, push, running, error)
             if sum_row(error) == ZERO:
                 break
+        pull *= np.float32(settings.pull_fade)
         for k in range(tree.joint.shape[0]):
             if tree.weight[k] > ZERO:
                 commit_row(joints[k + 1])
