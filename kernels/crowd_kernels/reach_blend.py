@@ -34,8 +34,8 @@ SLOTS = 24
 """Most examples that are blended for one hand."""
 LEAST_WEIGHT = 1e-4
 """Weights that fade end here."""
-SAME_PLACE = 0.002
-"""A look-up serves places this close to its own, m; a twentieth of the spacing of pseudo-examples."""
+SAME_PLACE = 0.004
+"""A look-up serves places this close to its own, m; a tenth of the spacing of pseudo-examples."""
 SAME_SHARE = 0.01
 """Likewise for the share of the upper body's examples."""
 CHAIN = 9
