@@ -13,6 +13,7 @@ from crowd.motion.body import build_skeleton
 from crowd.motion.joint_tree import joint_tree
 from crowd.motion.skeleton import Segment
 from crowd_kernels import _jit
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.ik import (
     CHUNKS,
@@ -98,7 +99,7 @@ def set_up(task: int) -> Callable[[int, np.random.Generator], Crowd]:
             start.reshape(size, -1).copy(),
             np.zeros((size, 3), np.float32),
             np.arange(size, dtype=np.int32),
-            np.zeros((CHUNKS, scratch_length(len(OFFSET), 1, 1)), np.float32),
+            aligned_zeros((CHUNKS, scratch_length(len(OFFSET), 1, 1)), np.float32),
             np.zeros((size, 1), np.uint8),
             np.zeros((size, 1), np.float32),
             np.zeros((size, 1), np.float32),
@@ -229,7 +230,7 @@ def set_up_arms(size: int, rng: np.random.Generator) -> Arms:
         rows.copy(),
         np.zeros((size, 3), np.float32),
         np.arange(size, dtype=np.int32),
-        np.zeros((CHUNKS, scratch_length(count, 1, len(Segment))), np.float32),
+        aligned_zeros((CHUNKS, scratch_length(count, 1, len(Segment))), np.float32),
         np.zeros((size, 1), np.uint8),
         np.zeros((size, 1), np.float32),
         np.zeros((size, 1), np.float32),

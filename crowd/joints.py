@@ -5,6 +5,7 @@ import numpy as np
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.people import People
 from crowd.state import Float32Array, FloatArray, IntArray, State
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.pose import CHUNKS, kinematics, scratch_length
 
 
@@ -21,12 +22,12 @@ class Joints:
 
     def __init__(self, skeleton: Skeleton, capacity: int) -> None:
         joint_count = skeleton.joint_count
-        self.position_model: Float32Array = np.zeros((capacity, joint_count, 3), np.float32)
-        self.rotation_model: Float32Array = np.zeros((capacity, joint_count, 4), np.float32)
+        self.position_model: Float32Array = aligned_zeros((capacity, joint_count, 3), np.float32)
+        self.rotation_model: Float32Array = aligned_zeros((capacity, joint_count, 4), np.float32)
         self._parent = np.ascontiguousarray(skeleton.parent, np.int32)
         self._offset = np.ascontiguousarray(skeleton.offset, np.float32)
         self._segment = np.ascontiguousarray(skeleton.segment, np.int32)
-        self._scratch = np.zeros((CHUNKS, scratch_length(joint_count, len(Segment))), np.float32)
+        self._scratch = aligned_zeros((CHUNKS, scratch_length(joint_count, len(Segment))), np.float32)
 
     def compute(self, state: State, people: People, active: IntArray) -> None:
         """Compute the joints of active people from their pose."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from crowd_kernels.aligned import aligned_full
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.reach_blend import SLOTS
 from crowd_kernels.reach_correction import LANES as CORRECTED_JOINTS
@@ -310,9 +311,7 @@ class State:
         arrays = {}
         for declared in fields(cls):
             shape = (capacity, *declared.metadata["shape"])
-            arrays[declared.name] = np.full(
-                shape, declared.metadata["fill"], dtype=declared.metadata["dtype"]
-            )
+            arrays[declared.name] = aligned_full(shape, declared.metadata["fill"], declared.metadata["dtype"])
         return cls(**arrays)
 
     @property

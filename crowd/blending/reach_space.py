@@ -17,6 +17,7 @@ from crowd.motion.clip import Clip
 from crowd.motion.clip_table import rows, sample_keys
 from crowd.motion.rotation import multiply, rotate
 from crowd.motion.skeleton import Segment, Skeleton
+from crowd_kernels.aligned import aligned_copy
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.reach_blend import LANES, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
 from crowd_kernels.reach_space import (
@@ -195,7 +196,7 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
     starts = np.cumsum([0, *(len(part) for part in sets)])[:-1]
     chains = np.array([arm_chain(skeleton, side) for side in SIDES])
     return ReachKeys(
-        np.ascontiguousarray(rotation),
+        aligned_copy(rotation),
         np.ascontiguousarray(pelvis),
         first,
         count,
@@ -373,7 +374,7 @@ def pack(pseudo: Sequence[PseudoExamples], starts: npt.NDArray[np.integer]) -> R
         leaf_start.append(np.concatenate([np.zeros(count, np.int64), leaves + begin]))
     nodes = np.concatenate([[0], np.cumsum([len(entry) for entry in box])[:-1]])
     return ReachArrays(
-        np.ascontiguousarray(np.concatenate(point).T),
+        aligned_copy(np.concatenate(point).T),
         np.concatenate(clip).astype(np.int32),
         np.ascontiguousarray(np.concatenate(weight)),
         np.array([part.point.min(axis=0) - MARGIN for part in pseudo]),

@@ -12,6 +12,7 @@ from crowd.errors import SettingsError, describe, nearest_first
 from crowd.motion.joint_tree import joint_trees
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.state import ByteArray, Float32Array, IntArray, State
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.hold import aim_holds, apply_holds, hold_effectors
 from crowd_kernels.ik import (
     CHUNKS,
@@ -88,13 +89,13 @@ class Constraint:
         count = len(EFFECTORS)
         self.trees = joint_trees(skeleton, EFFECTORS, weights=self.settings.weights)
         self.tree = self.trees[(1 << count) - 1]
-        self._target: Float32Array = np.zeros((capacity, count, 3), np.float32)
-        self._target_rotation: Float32Array = np.zeros((capacity, count, 4), np.float32)
-        self._angle: Float32Array = np.zeros((capacity, count), np.float32)
-        self._iterations = np.zeros(capacity, np.int32)
-        self._mask: ByteArray = np.zeros(capacity, np.uint8)
+        self._target: Float32Array = aligned_zeros((capacity, count, 3), np.float32)
+        self._target_rotation: Float32Array = aligned_zeros((capacity, count, 4), np.float32)
+        self._angle: Float32Array = aligned_zeros((capacity, count), np.float32)
+        self._iterations = aligned_zeros(capacity, np.int32)
+        self._mask: ByteArray = aligned_zeros(capacity, np.uint8)
         length = scratch_length(len(self.tree.joint), count, len(Segment))
-        self._scratch = np.zeros((CHUNKS, length), np.float32)
+        self._scratch = aligned_zeros((CHUNKS, length), np.float32)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Hold nothing of people who have just entered."""

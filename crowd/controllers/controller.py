@@ -7,6 +7,7 @@ import numpy as np
 
 from crowd.model import Model
 from crowd.state import Float32Array, IntArray, State
+from crowd_kernels.aligned import aligned_full, aligned_zeros
 from crowd_kernels.clip import CHUNKS, ROW, blend_samples
 
 
@@ -69,13 +70,13 @@ class KeySamples:
         """Make room for `count` samples of `capacity` characters."""
         shape = (capacity, count)
         return cls(
-            np.zeros(shape, np.int32),
-            np.zeros(shape, np.int32),
-            np.zeros(shape, np.float32),
-            np.zeros(shape, np.float32),
-            np.ones(capacity, np.float32),
-            np.zeros(capacity, np.int32),
-            np.zeros((CHUNKS, ROW), np.float32),
+            aligned_zeros(shape, np.int32),
+            aligned_zeros(shape, np.int32),
+            aligned_zeros(shape, np.float32),
+            aligned_zeros(shape, np.float32),
+            aligned_full(capacity, 1, np.float32),
+            aligned_zeros(capacity, np.int32),
+            aligned_zeros((CHUNKS, ROW), np.float32),
         )
 
     def blend_onto_pose(self, step: Step, characters: IntArray) -> None:

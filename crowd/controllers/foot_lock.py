@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.state import ByteArray, Float32Array, FloatArray, IntArray
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.foot_lock import LegArrays, LockLimits, lock_feet_crowd
 
 HEEL_BEHIND_ANKLE = 0.035
@@ -34,15 +35,15 @@ class FootLock:
     ) -> None:
         self.settings = settings or FootLockSettings()
         self.legs = leg_arrays(skeleton)
-        self.contact: ByteArray = np.zeros((capacity, 2), np.uint8)
-        self.is_released: npt.NDArray[np.bool_] = np.zeros((capacity, 2), np.bool_)
-        self.anchor: FloatArray = np.zeros((capacity, 2, 2))
-        self.anchor_yaw: FloatArray = np.zeros((capacity, 2))
-        self.offset: FloatArray = np.zeros((capacity, 2, 3))
-        self.offset_rate: FloatArray = np.zeros((capacity, 2, 3))
-        self.yaw_offset: FloatArray = np.zeros((capacity, 2))
-        self.yaw_offset_rate: FloatArray = np.zeros((capacity, 2))
-        self.drop: FloatArray = np.zeros((capacity, 2))
+        self.contact: ByteArray = aligned_zeros((capacity, 2), np.uint8)
+        self.is_released: npt.NDArray[np.bool_] = aligned_zeros((capacity, 2), np.bool_)
+        self.anchor: FloatArray = aligned_zeros((capacity, 2, 2))
+        self.anchor_yaw: FloatArray = aligned_zeros((capacity, 2))
+        self.offset: FloatArray = aligned_zeros((capacity, 2, 3))
+        self.offset_rate: FloatArray = aligned_zeros((capacity, 2, 3))
+        self.yaw_offset: FloatArray = aligned_zeros((capacity, 2))
+        self.yaw_offset_rate: FloatArray = aligned_zeros((capacity, 2))
+        self.drop: FloatArray = aligned_zeros((capacity, 2))
 
     def state_fields(self) -> dict[str, npt.NDArray[np.generic]]:
         """Arrays that change in a run."""

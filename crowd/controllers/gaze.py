@@ -21,6 +21,7 @@ from crowd.people import People
 from crowd.scenario import PlacedCharacters
 from crowd.state import ByteArray, Float32Array, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
+from crowd_kernels.aligned import aligned_full, aligned_zeros
 from crowd_kernels.gaze import (
     CHARACTER,
     CHUNKS,
@@ -84,7 +85,7 @@ class Gaze:
             self.glance_limits = self.glance_limits._replace(distance=seen)
         self._objects = objects
         self._look_at_world: FloatArray = np.full((capacity, 3), np.nan)
-        self._mode: ByteArray = np.zeros(capacity, np.uint8)
+        self._mode: ByteArray = aligned_zeros(capacity, np.uint8)
         self.may_glance: npt.NDArray[np.bool_] = np.full(capacity, self.settings.glances.is_on)
         """Who glances at others when nothing else is looked at. (character,)"""
         if placed is not None:
@@ -92,14 +93,14 @@ class Gaze:
             self._look_at_world[:] = placed.look_at_world
             self._mode[:] = [mode_index(attention) for attention in placed.attention]
         self._cells = None if avoidance is None else avoidance.steer_cells
-        self._trunk: Float32Array = np.ones(capacity, np.float32)
-        self._follow: Float32Array = np.ones(capacity, np.float32)
-        self._turned: IntArray = np.zeros(capacity, np.int32)
-        self._resting: IntArray = np.zeros(capacity, np.int32)
-        self.scratch: Float32Array = np.zeros(
+        self._trunk: Float32Array = aligned_full(capacity, 1, np.float32)
+        self._follow: Float32Array = aligned_full(capacity, 1, np.float32)
+        self._turned: IntArray = aligned_zeros(capacity, np.int32)
+        self._resting: IntArray = aligned_zeros(capacity, np.int32)
+        self.scratch: Float32Array = aligned_zeros(
             (CHUNKS, scratch_length(self.arrays.joint.shape[0])), np.float32
         )
-        self.keys = np.zeros((CHUNKS, NEIGHBORS_CONSIDERED), np.int64)
+        self.keys = aligned_zeros((CHUNKS, NEIGHBORS_CONSIDERED), np.int64)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Let people look where the scenario wants it, or ahead."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from crowd.controllers.controller import KeySamples, Step
 from crowd.state import FloatArray, IntArray, State
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.barycentric import locate_crowd
 from crowd_kernels.gait import contact_crowd, sample_crowd
 from crowd_kernels.locomotion import (
@@ -59,12 +60,12 @@ class Locomotion:
 
     def __init__(self, capacity: int, settings: LocomotionSettings | None = None) -> None:
         self.settings = settings or LocomotionSettings()
-        self.wanted_parameter = np.zeros((capacity, 3))
-        self.contact_wanted = np.zeros((capacity, 2), np.uint8)
+        self.wanted_parameter = aligned_zeros((capacity, 3))
+        self.contact_wanted = aligned_zeros((capacity, 2), np.uint8)
         """Contact of each foot as the layers want it, before foot locking. (character, 2)"""
-        self._library_wish = np.zeros((capacity, 3))
-        self._library_parameter = np.zeros((capacity, 3))
-        self._is_inside = np.zeros(capacity, np.uint8)
+        self._library_wish = aligned_zeros((capacity, 3))
+        self._library_parameter = aligned_zeros((capacity, 3))
+        self._is_inside = aligned_zeros(capacity, np.uint8)
         self._samples = KeySamples.create(capacity, 4)
 
     def activate(self, state: State, characters: IntArray) -> None:

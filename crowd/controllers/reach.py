@@ -22,6 +22,7 @@ from crowd.motion.skeleton import Segment, Skeleton
 from crowd.people import shoulders_world
 from crowd.state import FloatArray, IntArray, State
 from crowd.world import World
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
 from crowd_kernels.reach import CHUNKS, reach_crowd
@@ -120,20 +121,20 @@ class Reach:
         self._trees = joint_trees(library.skeleton, EFFECTORS)
         self._tree = self._trees[(1 << len(EFFECTORS)) - 1]
         capacity, size = len(stature), SCRATCH + MOST_SAMPLES
-        self._number = np.zeros((CHUNKS, size), np.int32)
-        self._real = np.zeros((CHUNKS, size))
-        self._rows = np.zeros((CHUNKS, 2 * ROW), np.float32)
+        self._number = aligned_zeros((CHUNKS, size), np.int32)
+        self._real = aligned_zeros((CHUNKS, size))
+        self._rows = aligned_zeros((CHUNKS, 2 * ROW), np.float32)
         length = scratch_length(len(self._tree.joint), len(EFFECTORS), len(Segment))
-        self._solve_scratch = np.zeros((CHUNKS, length), np.float32)
-        self._solution = np.zeros((capacity, 4 * PADDED_JOINTS), np.float32)
-        self._task = np.zeros((capacity, 2), np.uint8)
-        self._point = np.zeros((capacity, 2, 3), np.float32)
-        self._target = np.zeros((capacity, 2, 3), np.float32)
-        self._target_rotation = np.zeros((capacity, 2, 4), np.float32)
-        self._status = np.zeros((capacity, 2), np.uint8)
-        self._distance = np.zeros((capacity, 2), np.float32)
-        self._angle = np.zeros((capacity, 2), np.float32)
-        self._iterations = np.zeros(capacity, np.int32)
+        self._solve_scratch = aligned_zeros((CHUNKS, length), np.float32)
+        self._solution = aligned_zeros((capacity, 4 * PADDED_JOINTS), np.float32)
+        self._task = aligned_zeros((capacity, 2), np.uint8)
+        self._point = aligned_zeros((capacity, 2, 3), np.float32)
+        self._target = aligned_zeros((capacity, 2, 3), np.float32)
+        self._target_rotation = aligned_zeros((capacity, 2, 4), np.float32)
+        self._status = aligned_zeros((capacity, 2), np.uint8)
+        self._distance = aligned_zeros((capacity, 2), np.float32)
+        self._angle = aligned_zeros((capacity, 2), np.float32)
+        self._iterations = aligned_zeros(capacity, np.int32)
         self.part_seconds = {"blending": 0.0, "inverse kinematics": 0.0}
         """Time that the parts of this layer have taken, s."""
 

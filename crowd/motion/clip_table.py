@@ -10,6 +10,7 @@ from crowd.errors import MotionError, describe
 from crowd.motion.clip import TOE_ROLL, Clip, ClipKind, FootEvent, JointMask
 from crowd.motion.library import MotionLibrary
 from crowd.motion.skeleton import Skeleton
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 
 FloatArray = npt.NDArray[np.float64]
@@ -206,7 +207,7 @@ def rows(rotation: Float32Array) -> Float32Array:
         values = rotation[:, joint].astype(np.float64)
         reference[joint] = np.linalg.eigh(values.T @ values)[1][:, -1]
     sign = np.where(np.einsum("kjc,jc->kj", rotation, reference) < 0, -1, 1)[..., None]
-    table = np.zeros((keys, 4, PADDED_JOINTS), np.float32)
+    table = aligned_zeros((keys, 4, PADDED_JOINTS), np.float32)
     table[:, 0, joints:] = 1
     table[:, :, :joints] = np.transpose(rotation * sign, (0, 2, 1))
     return table.reshape(keys, 4 * PADDED_JOINTS)
@@ -231,7 +232,7 @@ def masks(skeleton: Skeleton) -> tuple[Float32Array, Float32Array]:
             case JointMask.HEAD:
                 return float(joint in HEAD_PARTS)
 
-    joint_mask = np.zeros((len(JointMask), PADDED_JOINTS), np.float32)
+    joint_mask = aligned_zeros((len(JointMask), PADDED_JOINTS), np.float32)
     joint_mask[0] = 1
     for row, mask in enumerate(JointMask):
         joint_mask[row, : skeleton.joint_count] = [share(mask, joint) for joint in skeleton.joint_names]

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from crowd.errors import SettingsError, describe
 from crowd.navigation.cell_table import CellTable
 from crowd.world.walls import Walls
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.contact import (
     MOST_PARTNERS,
     ContactLimits,
@@ -164,14 +165,14 @@ class Avoidance:
         self.steer_cells = CellTable(capacity, 0.25, settings.neighbor_distance)
         """Characters by cell, as the last `steer` sorted them, for searches up to `neighbor_distance`."""
         self._contact_cells = CellTable(capacity, 0.25, 4.0)
-        self._body = np.zeros(BODY_COLUMNS * capacity)
-        self._keys = np.zeros((CHUNKS, wanted), np.int64)
+        self._body = aligned_zeros(BODY_COLUMNS * capacity)
+        self._keys = aligned_zeros((CHUNKS, wanted), np.int64)
         line_count = settings.neighbor_count + MOST_EDGES
-        self._lines = np.zeros((CHUNKS, 4 * line_count))
-        self._projected = np.zeros((CHUNKS, 4 * line_count))
-        self._partner = np.zeros((capacity, MOST_PARTNERS), np.int32)
-        self._partner_count = np.zeros(capacity, np.int32)
-        self._near = np.zeros(capacity, np.int32)
+        self._lines = aligned_zeros((CHUNKS, 4 * line_count))
+        self._projected = aligned_zeros((CHUNKS, 4 * line_count))
+        self._partner = aligned_zeros((capacity, MOST_PARTNERS), np.int32)
+        self._partner_count = aligned_zeros(capacity, np.int32)
+        self._near = aligned_zeros(capacity, np.int32)
         self._contact_limits = ContactLimits(
             settings.contact_passes,
             settings.most_contact_passes,

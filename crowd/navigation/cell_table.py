@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from crowd_kernels.aligned import aligned_full, aligned_zeros
 from crowd_kernels.cells import find_extent, mean_company, sort_into_cells
 
 FloatArray = npt.NDArray[np.float64]
@@ -33,11 +34,11 @@ class CellTable:
         self.columns = 0
         self.rows = 0
         self.sorted_count = 0
-        self.character: IntArray = np.zeros(capacity, np.int32)
-        self.slot: IntArray = np.full(capacity, -1, np.int32)
-        self.point: FloatArray = np.zeros(2 * capacity)
-        self.cell_start: IntArray = np.zeros(1, np.int32)
-        self._cell_of_index: IntArray = np.zeros(capacity, np.int32)
+        self.character: IntArray = aligned_zeros(capacity, np.int32)
+        self.slot: IntArray = aligned_full(capacity, -1, np.int32)
+        self.point: FloatArray = aligned_zeros(2 * capacity)
+        self.cell_start: IntArray = aligned_zeros(1, np.int32)
+        self._cell_of_index: IntArray = aligned_zeros(capacity, np.int32)
         self._cell_limit = 4 * capacity + 1024
         self._smallest = smallest_cell_size
         self._largest = largest_cell_size
@@ -70,7 +71,7 @@ class CellTable:
     ) -> None:
         self.columns, self.rows = find_extent(position_world, active, self.cell_size, reach, self._cell_limit)
         if self.cell_start.shape[0] < self.columns * self.rows + 1:
-            self.cell_start = np.zeros(2 * self.columns * self.rows + 1, np.int32)
+            self.cell_start = aligned_zeros(2 * self.columns * self.rows + 1, np.int32)
         self.sorted_count = sort_into_cells(
             position_world,
             radius,

@@ -23,6 +23,7 @@ from crowd_kernels.ik_rows import (
     EFFECTOR_ROW,
     FRAME,
     IS_FAR,
+    IS_FIXED,
     JOINT_ROW,
     LENGTH,
     PLACE,
@@ -36,19 +37,26 @@ from crowd_kernels.ik_rows import (
     WANTS_PLACE,
     accumulate_cross_row,
     accumulate_frame_row,
+    accumulate_free_cross_row,
+    accumulate_free_frame_row,
+    accumulate_free_place_row,
     accumulate_place_row,
     add_row,
     add_torque_row,
+    begin_fixing_row,
     clear_row,
     commit_row,
     divide_block,
     effector_row,
     factor_block,
+    find_limit_row,
     forward_row,
+    free_step_row,
     hold_reference_row,
     limit_row,
     lock_axis_row,
     pull_row,
+    rest_row,
     root_accumulate_row,
     root_commit_row,
     root_pull_row,
@@ -58,7 +66,6 @@ from crowd_kernels.ik_rows import (
     solve_lower,
     solve_upper,
     start_push_row,
-    start_step_row,
     step_row,
     subtract_block,
     subtract_drift_row,
@@ -410,10 +417,12 @@ def free_joints(tree: TreeArrays, gain: Any, bound: Any, joints: Any) -> None:
         if tree.weight[k] <= ZERO:
             continue
         above = joints[tree.parent[k] + 1]
-        pull_row(above, tree.weight[k], gain, bound, joints[k + 1])
+        pull_row(above, gain, bound, joints[k + 1])
         if tree.is_limited[k]:
             for axis in range(3):
                 if tree.is_free[k, axis] == ZERO:
+                    if joints[k + 1, IS_FIXED] == ZERO:
+                        begin_fixing_row(tree.weight[k], joints[k + 1])
                     lock_axis_row(
                         above,
                         tree.weight[k],
@@ -422,6 +431,47 @@ def free_joints(tree: TreeArrays, gain: Any, bound: Any, joints: Any) -> None:
                         axis,
                         joints[k + 1],
                     )
+
+
+@kernel
+def add_joint(weight: Any, joint: Any, effectors: Any, a: int, b: int, parts: int, out_system: Any) -> None:
+    """Add a joint's share to the blocks of two effectors.
+
+    Parameters
+    ----------
+    weight : float32
+        How easily the joint turns.
+    joint : (JOINT_ROW,) float32
+    effectors : (E, EFFECTOR_ROW) float32
+    a, b : int
+        Effectors of the blocks' rows and columns.
+    parts : int
+        Rows of blocks of an effector: 1 position, 2 position and rotation.
+    out_system : (E * parts * (E * parts + 1) / 2, 144) float32
+        Blocks of the lower triangle, in and out.
+    """
+    places = out_system[block_of(a * parts, b * parts)]
+    is_free = joint[IS_FIXED] == ZERO
+    if is_free:
+        accumulate_free_place_row(joint, weight, effectors[a], effectors[b], places)
+    else:
+        accumulate_place_row(joint, effectors[a], effectors[b], places)
+    if parts == 1:
+        return
+    # The two blocks of a's rotation are neighbours.
+    first = block_of(2 * a + 1, 2 * b)
+    frames = out_system[first : first + 2].reshape(2 * BLOCK)
+    if is_free:
+        accumulate_free_frame_row(joint, weight, effectors[a], effectors[b], frames)
+    else:
+        accumulate_frame_row(joint, effectors[a], effectors[b], frames)
+    if a == b:
+        return
+    cross = out_system[block_of(2 * a, 2 * b + 1)]
+    if is_free:
+        accumulate_free_cross_row(joint, weight, effectors[a], effectors[b], cross)
+    else:
+        accumulate_cross_row(joint, effectors[a], effectors[b], cross)
 
 
 @kernel
@@ -460,31 +510,9 @@ def build_system(
                     root_weight,
                     out_system[block_of(a * parts, b * parts)],
                 )
-            # The two blocks of a's rotation are neighbours.
-            frames = block_of(2 * a + 1, 2 * b)
             for k in range(tree.joint.shape[0]):
-                if not (tree.moves[a, k] and tree.moves[b, k]):
-                    continue
-                accumulate_place_row(
-                    joints[k + 1],
-                    effectors[a],
-                    effectors[b],
-                    out_system[block_of(a * parts, b * parts)],
-                )
-                if parts == 2:
-                    accumulate_frame_row(
-                        joints[k + 1],
-                        effectors[a],
-                        effectors[b],
-                        out_system[frames : frames + 2].reshape(2 * BLOCK),
-                    )
-                    if a != b:
-                        accumulate_cross_row(
-                            joints[k + 1],
-                            effectors[a],
-                            effectors[b],
-                            out_system[block_of(2 * a, 2 * b + 1)],
-                        )
+                if tree.moves[a, k] and tree.moves[b, k]:
+                    add_joint(tree.weight[k], joints[k + 1], effectors, a, b, parts, out_system)
 
 
 @kernel
@@ -518,12 +546,32 @@ def turn_joints(
     for k in range(tree.joint.shape[0]):
         if tree.weight[k] <= ZERO:
             continue
-        start_step_row(joints[k + 1])
+        is_first = True
         for e in range(tree.effector.shape[0]):
             if tree.moves[e, k]:
-                add_torque_row(effectors[e], push[e], joints[k + 1])
-        step_row(joints[tree.parent[k] + 1], running, joints[k + 1])
-        if tree.is_limited[k]:
+                add_torque_row(effectors[e], push[e], is_first, joints[k + 1])
+                is_first = False
+        if is_first:
+            rest_row(joints[k + 1])
+        above = joints[tree.parent[k] + 1]
+        if joints[k + 1, IS_FIXED] == ZERO:
+            free_step_row(above, tree.weight[k], running, joints[k + 1])
+        else:
+            step_row(above, running, joints[k + 1])
+        if not tree.is_limited[k]:
+            continue
+        is_free = tree.is_free[k, 0] * tree.is_free[k, 1] * tree.is_free[k, 2] > ZERO
+        is_outside = find_limit_row(
+            frame_of(tree.parent_frame, k),
+            frame_of(tree.joint_frame, k),
+            tree.inverse_swing[k, 0],
+            tree.inverse_swing[k, 1],
+            approach,
+            joints[k + 1],
+        )
+        if is_outside or not is_free:
+            if joints[k + 1, IS_FIXED] == ZERO:
+                begin_fixing_row(tree.weight[k], joints[k + 1])
             limit_row(
                 joints[tree.parent[k] + 1],
                 tree.weight[k],
@@ -534,7 +582,6 @@ def turn_joints(
                 tree.is_free[k, 0],
                 tree.is_free[k, 1],
                 tree.is_free[k, 2],
-                approach,
                 running,
                 joints[k + 1],
                 out_violations,
@@ -767,17 +814,16 @@ def gather_joints(
         scale = segment_scale[character, tree.root_segment]
         for axis in range(3):
             out_joints[0, PLACE + axis * LANES + lane] = root_position[character, axis] * scale
+        pose = pose_rotation[character]
+        reference = reference_rotation[character]
+        for k in range(tree.joint.shape[0]):
+            begin = tree.joint[k] * tree.joint_step
+            for component in range(4):
+                index = begin + component * tree.component_step
+                out_joints[k + 1, ROTATION + component * LANES + lane] = pose[index]
+                out_joints[k + 1, REFERENCE + component * LANES + lane] = reference[index]
     out_joints[0, FRAME : FRAME + LANES] = ONE
     out_joints[0, FRAME + LANES : FRAME + 4 * LANES] = ZERO
-    for k in range(tree.joint.shape[0]):
-        for component in range(4):
-            index = component * tree.component_step + tree.joint[k] * tree.joint_step
-            begin = component * LANES
-            row = out_joints[k + 1]
-            for lane in range(LANES):
-                character = active[min(first + lane, count - 1)]
-                row[begin + ROTATION + lane] = pose_rotation[character, index]
-                row[begin + REFERENCE + lane] = reference_rotation[character, index]
     for k in range(tree.joint.shape[0]):
         if tree.is_limited[k]:
             hold_reference_row(

@@ -31,7 +31,8 @@ PLACE = 8 * LANES
 FRAME = 11 * LANES
 """World rotation, 4."""
 MOBILITY = 15 * LANES
-"""Symmetric matrix that turns a torque into a rotation: xx, xy, xz, yy, yz, zz."""
+"""Symmetric matrix that turns a torque into a rotation: xx, xy, xz, yy, yz, zz. Only where `IS_FIXED`; joints
+that turn freely have their weight in its place."""
 DRIFT = 21 * LANES
 """Rotation vector that the joint turns by without any torque, rad, 3."""
 STEP = 24 * LANES
@@ -44,7 +45,13 @@ TWIST_BOUND = 32 * LANES
 """Least and largest twist, 2."""
 HELD = 34 * LANES
 """Swing x and y and twist of the reference pose, 3."""
-JOINT_ROW = 37 * LANES
+NEXT_SWING = 37 * LANES
+"""Swing x and y and twist of the next rotation, 3."""
+ROOM = 40 * LANES
+"""Bounds of this iteration: largest value of the swing ellipse, least and largest twist, 3."""
+IS_FIXED = 43 * LANES
+"""Not 0 in the first lane where some direction does not turn freely in some lane."""
+JOINT_ROW = 44 * LANES
 
 # An effector.
 POINT = 0
@@ -169,21 +176,19 @@ def forward_row(above: Any, scale: Any, x: Any, y: Any, z: Any, row: Any) -> Non
 
 
 @inlined_kernel
-def pull_row(above: Any, weight: Any, gain: Any, bound: Any, row: Any) -> None:
+def pull_row(above: Any, gain: Any, bound: Any, row: Any) -> None:
     """Free a joint, and let it drift towards the reference pose.
 
     Parameters
     ----------
     above : (JOINT_ROW,) float32
         The parent.
-    weight : float32
-        How easily the joint turns.
     gain : float32
         Share of the way to the reference.
     bound : float32
         Largest drift, rad.
     row : (JOINT_ROW,) float32
-        The joint: drift and mobility are written.
+        The joint: its drift is written.
     """
     for lane in range(LANES):
         way = multiply(quaternion_at(row, REFERENCE, lane), conjugate(quaternion_at(row, ROTATION, lane)))
@@ -192,6 +197,21 @@ def pull_row(above: Any, weight: Any, gain: Any, bound: Any, row: Any) -> None:
         share = share if way[0] >= ZERO else -share
         drift = rotate(quaternion_at(above, FRAME, lane), (way[1] * share, way[2] * share, way[3] * share))
         put_vector(row, DRIFT, lane, drift)
+    row[IS_FIXED] = ZERO
+
+
+@inlined_kernel
+def begin_fixing_row(weight: Any, row: Any) -> None:
+    """Give a joint that turns freely the mobility from which directions can be taken.
+
+    Parameters
+    ----------
+    weight : float32
+        How easily the joint turns.
+    row : (JOINT_ROW,) float32
+        The joint: its mobility is written.
+    """
+    for lane in range(LANES):
         first = MOBILITY + lane
         row[first] = weight
         row[first + LANES] = ZERO
@@ -199,6 +219,7 @@ def pull_row(above: Any, weight: Any, gain: Any, bound: Any, row: Any) -> None:
         row[first + 3 * LANES] = weight
         row[first + 4 * LANES] = ZERO
         row[first + 5 * LANES] = weight
+    row[IS_FIXED] = ONE
 
 
 @inlined_kernel
@@ -447,6 +468,72 @@ def accumulate_place_row(joint: Any, a: Any, b: Any, out_block: Any) -> None:
 
 
 @inlined_kernel
+def accumulate_free_place_row(joint: Any, weight: Any, a: Any, b: Any, out_block: Any) -> None:
+    """Add the share of a joint that turns freely to the block of two effectors' positions.
+
+    Parameters
+    ----------
+    joint : (JOINT_ROW,) float32
+    weight : float32
+        How easily it turns.
+    a, b : (EFFECTOR_ROW,) float32
+        Effectors of the block's rows and columns.
+    out_block : (144,) float32
+        Block of J W J^T, in and out.
+
+    Notes
+    -----
+    Sums have the bits of `accumulate_place_row`.
+    """
+    for lane in range(LANES):
+        place = vector_at(joint, PLACE, lane)
+        lever = subtract(vector_at(a, TIP, lane), place)
+        other = subtract(vector_at(b, TIP, lane), place)
+        share = a[WANTS_PLACE + lane] * b[WANTS_PLACE + lane]
+        x, y, z = weight * other[0], weight * other[1], weight * other[2]
+        u, v, w = lever[0] * share, lever[1] * share, lever[2] * share
+        out_block[lane] += w * z + v * y
+        out_block[LANES + lane] -= v * x
+        out_block[2 * LANES + lane] -= w * x
+        out_block[3 * LANES + lane] -= u * y
+        out_block[4 * LANES + lane] += u * x + w * z
+        out_block[5 * LANES + lane] -= w * y
+        out_block[6 * LANES + lane] -= u * z
+        out_block[7 * LANES + lane] -= v * z
+        out_block[8 * LANES + lane] += v * y + u * x
+
+
+@inlined_kernel
+def accumulate_free_frame_row(joint: Any, weight: Any, a: Any, b: Any, out_blocks: Any) -> None:
+    """Add the share of a joint that turns freely to the blocks of one effector's rotation with another's.
+
+    Parameters
+    ----------
+    joint : (JOINT_ROW,) float32
+    weight : float32
+        How easily it turns.
+    a, b : (EFFECTOR_ROW,) float32
+        Effectors of the blocks' rows and columns.
+    out_blocks : (288,) float32
+        Two neighbouring blocks of J W J^T, in and out.
+    """
+    for lane in range(LANES):
+        other = subtract(vector_at(b, TIP, lane), vector_at(joint, PLACE, lane))
+        share = a[TURNS + lane] * b[WANTS_PLACE + lane]
+        x, y, z = weight * other[0], weight * other[1], weight * other[2]
+        out_blocks[LANES + lane] -= share * z
+        out_blocks[2 * LANES + lane] += share * y
+        out_blocks[3 * LANES + lane] += share * z
+        out_blocks[5 * LANES + lane] -= share * x
+        out_blocks[6 * LANES + lane] -= share * y
+        out_blocks[7 * LANES + lane] += share * x
+        share = weight * a[TURNS + lane] * b[TURNS + lane]
+        out_blocks[9 * LANES + lane] += share
+        out_blocks[13 * LANES + lane] += share
+        out_blocks[17 * LANES + lane] += share
+
+
+@inlined_kernel
 def accumulate_frame_row(joint: Any, a: Any, b: Any, out_blocks: Any) -> None:
     """Add a joint's share to the blocks of one effector's rotation with another's position and rotation.
 
@@ -511,6 +598,32 @@ def accumulate_cross_row(joint: Any, a: Any, b: Any, out_block: Any) -> None:
         out_block[6 * LANES + lane] += share * x[2]
         out_block[7 * LANES + lane] += share * y[2]
         out_block[8 * LANES + lane] += share * z[2]
+
+
+@inlined_kernel
+def accumulate_free_cross_row(joint: Any, weight: Any, a: Any, b: Any, out_block: Any) -> None:
+    """Add the share of a joint that turns freely to the block of a position with another's rotation.
+
+    Parameters
+    ----------
+    joint : (JOINT_ROW,) float32
+    weight : float32
+        How easily it turns.
+    a, b : (EFFECTOR_ROW,) float32
+        Effectors of the block's rows and columns.
+    out_block : (144,) float32
+        Block of J W J^T, in and out.
+    """
+    for lane in range(LANES):
+        lever = subtract(vector_at(a, TIP, lane), vector_at(joint, PLACE, lane))
+        share = a[WANTS_PLACE + lane] * b[TURNS + lane]
+        x, y, z = weight * lever[0], weight * lever[1], weight * lever[2]
+        out_block[LANES + lane] += share * z
+        out_block[2 * LANES + lane] -= share * y
+        out_block[3 * LANES + lane] -= share * z
+        out_block[5 * LANES + lane] += share * x
+        out_block[6 * LANES + lane] += share * y
+        out_block[7 * LANES + lane] -= share * x
 
 
 @inlined_kernel
@@ -678,20 +791,7 @@ def subtract_upper(block: Any, values: Any, out_values: Any) -> None:
 
 
 @inlined_kernel
-def start_step_row(joint: Any) -> None:
-    """Begin a joint's step: no torque.
-
-    Parameters
-    ----------
-    joint : (JOINT_ROW,) float32
-        The joint: its step is written.
-    """
-    for lane in range(LANES):
-        put_vector(joint, STEP, lane, (ZERO, ZERO, ZERO))
-
-
-@inlined_kernel
-def add_torque_row(effector: Any, push: Any, joint: Any) -> None:
+def add_torque_row(effector: Any, push: Any, is_first: bool, joint: Any) -> None:
     """Add the torque that an effector's push gives a joint to what stands in its step.
 
     Parameters
@@ -699,6 +799,8 @@ def add_torque_row(effector: Any, push: Any, joint: Any) -> None:
     effector : (EFFECTOR_ROW,) float32
     push : (PUSH,) float32
         Force and torque at the effector.
+    is_first : bool
+        Nothing stands there yet.
     joint : (JOINT_ROW,) float32
         The joint: its step is changed.
     """
@@ -713,11 +815,24 @@ def add_torque_row(effector: Any, push: Any, joint: Any) -> None:
             STEP,
             lane,
             (
-                torque[0] + place * x + frame * turn[0],
-                torque[1] + place * y + frame * turn[1],
-                torque[2] + place * z + frame * turn[2],
+                (ZERO if is_first else torque[0]) + place * x + frame * turn[0],
+                (ZERO if is_first else torque[1]) + place * y + frame * turn[1],
+                (ZERO if is_first else torque[2]) + place * z + frame * turn[2],
             ),
         )
+
+
+@inlined_kernel
+def rest_row(joint: Any) -> None:
+    """Let no torque stand in the step of a joint that moves no effector.
+
+    Parameters
+    ----------
+    joint : (JOINT_ROW,) float32
+        The joint: its step is written.
+    """
+    for lane in range(LANES):
+        put_vector(joint, STEP, lane, (ZERO, ZERO, ZERO))
 
 
 @inlined_kernel
@@ -725,6 +840,29 @@ def turned_by(outer: Quaternion, rotation: Quaternion, step: Vector) -> Quaterni
     """Turn a local rotation by a small rotation vector of the root frame, to second order."""
     x, y, z = rotate(conjugate(outer), (HALF * step[0], HALF * step[1], HALF * step[2]))
     return unit_quaternion(multiply((ONE, x, y, z), rotation))
+
+
+@inlined_kernel
+def put_step(above: Any, turn: Vector, run: Any, lane: int, row: Any) -> None:
+    """Write a joint's step, its drift and a rotation vector together, and where it leads."""
+    drift = vector_at(row, DRIFT, lane)
+    step = (run * (drift[0] + turn[0]), run * (drift[1] + turn[1]), run * (drift[2] + turn[2]))
+    put_vector(row, STEP, lane, step)
+    before = quaternion_at(row, ROTATION, lane)
+    after = turned_by(quaternion_at(above, FRAME, lane), before, step)
+    # Scaling to unit length again and again would change the bits of those who wait.
+    is_still = run == ZERO
+    put_quaternion(
+        row,
+        NEXT,
+        lane,
+        (
+            before[0] if is_still else after[0],
+            before[1] if is_still else after[1],
+            before[2] if is_still else after[2],
+            before[3] if is_still else after[3],
+        ),
+    )
 
 
 @inlined_kernel
@@ -741,13 +879,71 @@ def step_row(above: Any, is_running: Any, row: Any) -> None:
         The joint: step and next rotation are written.
     """
     for lane in range(LANES):
-        run = is_running[lane]
-        turn = moved(row, lane, vector_at(row, STEP, lane))
-        drift = vector_at(row, DRIFT, lane)
-        step = (run * (drift[0] + turn[0]), run * (drift[1] + turn[1]), run * (drift[2] + turn[2]))
-        put_vector(row, STEP, lane, step)
-        next_rotation = turned_by(quaternion_at(above, FRAME, lane), quaternion_at(row, ROTATION, lane), step)
-        put_quaternion(row, NEXT, lane, next_rotation)
+        put_step(above, moved(row, lane, vector_at(row, STEP, lane)), is_running[lane], lane, row)
+
+
+@inlined_kernel
+def free_step_row(above: Any, weight: Any, is_running: Any, row: Any) -> None:
+    """Do the same as `step_row` for a joint that turns freely, with the same bits.
+
+    Parameters
+    ----------
+    weight : float32
+        How easily the joint turns.
+
+    Notes
+    -----
+    All other arguments are those of `step_row`.
+    """
+    for lane in range(LANES):
+        torque = vector_at(row, STEP, lane)
+        turn = (weight * torque[0], weight * torque[1], weight * torque[2])
+        put_step(above, turn, is_running[lane], lane, row)
+
+
+@inlined_kernel
+def find_limit_row(
+    parent_frame: Quaternion,
+    joint_frame: Quaternion,
+    inverse_x: Any,
+    inverse_y: Any,
+    approach: Any,
+    row: Any,
+) -> bool:
+    """Find swing and twist of a joint's next rotation, and how far they may go in this iteration.
+
+    Parameters
+    ----------
+    parent_frame, joint_frame : tuple of float32
+    inverse_x, inverse_y : float32
+        See `LimitArrays.inverse_swing`.
+    approach : float32
+        Largest share of the way to a limit that the joint goes now.
+    row : (JOINT_ROW,) float32
+        The joint: next swing and room are written.
+
+    Returns
+    -------
+    bool
+        Someone's joint would leave its limits.
+    """
+    is_outside = False
+    for lane in range(LANES):
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, ROTATION, lane), joint_frame))
+        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
+        bound = row[SWING_BOUND + lane]
+        # Up to a share of the way to the limit, so that joints come to rest there softly.
+        radius = np.sqrt(value) + approach * max(np.sqrt(bound) - np.sqrt(value), ZERO)
+        bound = min(radius * radius, bound)
+        low, high = row[TWIST_BOUND + lane], row[TWIST_BOUND + LANES + lane]
+        low = max(low, twist + approach * min(low - twist, ZERO))
+        high = min(high, twist + approach * max(high - twist, ZERO))
+        put_vector(row, ROOM, lane, (bound, low, high))
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
+        put_vector(row, NEXT_SWING, lane, (x, y, twist))
+        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
+        is_outside |= (value > bound) | (twist > high) | (twist < low)
+    return is_outside
 
 
 @inlined_kernel
@@ -761,7 +957,6 @@ def limit_row(
     free_x: Any,
     free_y: Any,
     free_twist: Any,
-    approach: Any,
     is_running: Any,
     row: Any,
     out_violations: Any,
@@ -779,28 +974,25 @@ def limit_row(
         See `LimitArrays.inverse_swing`.
     free_x, free_y, free_twist : float32
         See `LimitArrays.is_free`.
-    approach : float32
-        Largest share of the way to a limit that the joint goes now.
     is_running : (16,) float32
         0 where the character stays as it is.
     row : (JOINT_ROW,) float32
-        The joint: its next rotation is projected; drift and mobility lose what is fixed.
+        The joint, after `find_limit_row`: its next rotation is projected; drift and mobility lose what is
+        fixed.
     out_violations : (16,) float32
         Grows by the number of directions that were fixed.
+
+    Notes
+    -----
+    Rotations within their limits keep their bits, so that nobody's pose depends on who shares the row.
     """
+    is_free = free_x * free_y * free_twist
     for lane in range(LANES):
-        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, ROTATION, lane), joint_frame))
-        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
-        bound = row[SWING_BOUND + lane]
-        # Up to a share of the way to the limit, so that joints come to rest there softly.
-        radius = np.sqrt(value) + approach * max(np.sqrt(bound) - np.sqrt(value), ZERO)
-        bound = min(radius * radius, bound)
-        low, high = row[TWIST_BOUND + lane], row[TWIST_BOUND + LANES + lane]
-        low = max(low, twist + approach * min(low - twist, ZERO))
-        high = min(high, twist + approach * max(high - twist, ZERO))
-        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
+        x, y, twist = vector_at(row, NEXT_SWING, lane)
+        bound, low, high = vector_at(row, ROOM, lane)
         held = vector_at(row, HELD, lane)
         value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
+        is_inside = (value <= bound) & (twist >= low) & (twist <= high) & (is_free > ZERO)
         share = np.sqrt(bound / max(value, bound))
         swings_out = is_running[lane] if value > bound + SLACK * bound else ZERO
         twists_out = is_running[lane] if (twist > high + SLACK) | (twist < low - SLACK) else ZERO
@@ -809,7 +1001,6 @@ def limit_row(
         y = held[1] + free_y * (y * share - held[1])
         twist = held[2] + free_twist * (min(max(twist, low), high) - held[2])
         inside = out_of_limit(parent_frame, join(x, y, twist), joint_frame)
-        stays = ONE - is_running[lane]
         before = quaternion_at(row, ROTATION, lane)
         sign = (
             ONE
@@ -818,15 +1009,17 @@ def limit_row(
             else -ONE
         )
         run = sign * is_running[lane]
+        stays = ONE - is_running[lane]
+        after = quaternion_at(row, NEXT, lane)
         put_quaternion(
             row,
             NEXT,
             lane,
             (
-                run * inside[0] + stays * before[0],
-                run * inside[1] + stays * before[1],
-                run * inside[2] + stays * before[2],
-                run * inside[3] + stays * before[3],
+                after[0] if is_inside else run * inside[0] + stays * before[0],
+                after[1] if is_inside else run * inside[1] + stays * before[1],
+                after[2] if is_inside else run * inside[2] + stays * before[2],
+                after[3] if is_inside else run * inside[3] + stays * before[3],
             ),
         )
         # The rotation vector to the projection, as the update measures it.

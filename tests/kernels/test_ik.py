@@ -190,10 +190,14 @@ def test_characters_reach_in_their_own_proportions(rng):
     assert crowd.errors()[:, 0].max() < 1.05e-3
 
 
-def test_equal_bits_on_one_and_many_threads_and_in_any_order(rng):
+@pytest.mark.parametrize("task", [1, 3])
+@pytest.mark.parametrize("is_limited", [False, True])
+@pytest.mark.parametrize("make", [arm, both_arms])
+def test_equal_bits_on_one_and_many_threads_and_in_any_order(make, is_limited, task):
     results = []
     for build in (solve_crowd.serial, solve_crowd.threaded):
-        crowd = crowd_of(arm(), np.random.default_rng(4), 200)
+        crowd = crowd_of(make(is_limited=is_limited), np.random.default_rng(4), 200)
+        crowd.task[:] = task
         if build is solve_crowd.threaded:
             crowd.active = crowd.active[::-1].copy()
         results.append(crowd.solve(build).pose)

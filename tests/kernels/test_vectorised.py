@@ -48,13 +48,18 @@ ARITHMETIC_LEAVES = {
 QUATERNION = numba.types.UniTuple(NUMBER, 4)
 ARITHMETIC_LEAVES |= {
     ik_rows.forward_row: (ROW, ROW, NUMBER, NUMBER, NUMBER, ROW),
-    ik_rows.pull_row: (ROW, NUMBER, NUMBER, NUMBER, ROW),
+    ik_rows.pull_row: (ROW, NUMBER, NUMBER, ROW),
     ik_rows.subtract_drift_row: (ROW, ROW, ROW),
     ik_rows.accumulate_place_row: (ROW, ROW, ROW, ROW),
     ik_rows.accumulate_frame_row: (ROW, ROW, ROW, ROW),
-    ik_rows.add_torque_row: (ROW, ROW, ROW),
+    ik_rows.accumulate_free_place_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_rows.accumulate_free_frame_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_rows.accumulate_free_cross_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_rows.add_torque_row: (ROW, ROW, numba.boolean, ROW),
     ik_rows.step_row: (ROW, ROW, ROW),
-    ik_rows.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 6, ROW, ROW, ROW),
+    ik_rows.free_step_row: (ROW, NUMBER, ROW, ROW),
+    ik_rows.find_limit_row: (QUATERNION, QUATERNION, *[NUMBER] * 3, ROW),
+    ik_rows.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW),
     ik_rows.subtract_block: (ROW, ROW, ROW),
 }
 SHUFFLE_LEAVES = {
