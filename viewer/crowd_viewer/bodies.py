@@ -197,7 +197,7 @@ def worn_where(recipe: Recipe) -> FloatArray:
 
 
 def landmarks(skeleton: Skeleton) -> dict[str, str]:
-    """Heights on the body in rest pose that clothes and faces go by, as constants for shaders."""
+    """Heights in rest pose and joints that clothes and faces go by, as constants for shaders."""
     rest, unit = rest_positions(skeleton), skeleton.stature / 1.75
     head, eye = rest[skeleton.joint("head")], rest[skeleton.joint("left_eye")]
     values = {
@@ -211,4 +211,6 @@ def landmarks(skeleton: Skeleton) -> dict[str, str]:
         "CHEST": rest[skeleton.joint("spine_4")][1] + 0.03 * unit,
         "SHOE_TOP": rest[skeleton.joint("left_foot")][1] - 0.005 * unit,
     }
-    return {name: f"{float(value):.5f}" for name, value in values.items()}
+    names = ("head", "left_eye", "right_eye")
+    joints = {f"{name.upper()}_JOINT": str(skeleton.joint(name)) for name in names}
+    return {name: f"{float(value):.5f}" for name, value in values.items()} | joints

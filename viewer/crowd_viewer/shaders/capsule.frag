@@ -44,7 +44,7 @@ void main() {
     float share = clamp(0.5 + 0.5 * across.y / max(start.w, 1e-4), 0.0, 1.0);
     vec3 rest_place = mix(start.xyz, end.xyz, share) + end.w * rest_normal;
     int piece = worn > 0 ? worn - 1 : piece_at(rest_place, limb, vec4(ends.xyz, abs(ends.w)), ends.w > 0.0);
-    Material material = clothes(slot, piece, rest_place, rest_normal);
+    Material material = clothes(slot, piece, rest_place, rest_normal, vec2(0.0));
     vec3 light = lit(material.colour, material.gloss, place, normal);
     colour = displayed(hazy(light, place));
     if (slot == picked) colour.rgb = mix(colour.rgb, vec3(1.0, 0.72, 0.1), 0.45);

@@ -51,7 +51,9 @@ float relief(int slot, int piece, vec3 at) {
     return 0.0;
 }
 
-Material face(vec4 skin, vec3 hair, vec3 at, float pixel) {
+const float EYEBALL = 0.0125;  // radius, m
+
+Material face(vec4 skin, vec3 hair, vec3 at, vec2 gaze, float pixel) {
     vec3 colour = skin.rgb;
     float side = abs(at.x), ahead = at.z - HEAD_MIDDLE;
     if (at.y > CHIN && ahead > 0.0) {
@@ -63,13 +65,20 @@ Material face(vec4 skin, vec3 hair, vec3 at, float pixel) {
             float cheek = length(vec2(side - 0.040, at.y - EYES + 0.036)) / 0.030;
             colour = mix(colour, colour * vec3(1.05, 0.82, 0.78), 0.5 * exp(-cheek * cheek));
             vec2 eye = vec2(side - 0.0315, at.y - EYES - 0.0005);
-            float open = length(vec2(eye.x, eye.y * (eye.y > 0.0 ? 2.5 : 2.1)));
+            vec2 looking = vec2(at.x > 0.0 ? gaze.x : -gaze.x, gaze.y);
+            // Lids go up and down with the eye, the upper one further, and meet at its corners.
+            float lifted = eye.y - 0.35 * EYEBALL * looking.y * (1.0 - eye.x * eye.x / 0.00018);
+            float open = length(vec2(eye.x, lifted * (lifted > 0.0 ? 2.5 / (1.0 + 1.1 * looking.y) : 2.1)));
             // What is smaller than a pixel fades instead of growing to its size.
             float clear = min(0.0035 / pixel, 1.0);
             float white = clear * (1.0 - smoothstep(0.0125, 0.0135 + pixel, open));
             colour = mix(colour, vec3(0.50, 0.47, 0.45), 0.85 * white);
             vec3 iris = mix(vec3(0.035, 0.020, 0.013), vec3(0.10, 0.13, 0.15), step(0.35, skin.r) * step(0.12, hair.r));
-            colour = mix(colour, iris, white * (1.0 - smoothstep(0.0052, 0.0062 + pixel, length(eye))));
+            // Seen from ahead, the iris of an eye that looks aside is narrow.
+            vec2 away = eye - EYEBALL * looking;
+            float along = dot(away, looking);
+            float ring = sqrt(dot(away, away) + along * along / max(1.0 - dot(looking, looking), 0.1));
+            colour = mix(colour, iris, white * (1.0 - smoothstep(0.0052, 0.0062 + pixel, ring)));
             float lid = abs(open - 0.0135) + max(-eye.y, 0.0) * 0.6;
             colour = mix(colour, vec3(0.05, 0.03, 0.025), 0.8 * clear * (1.0 - smoothstep(0.0014, 0.0032 + pixel, lid)));
             float brow = length(vec2((side - 0.034) * 0.42, (at.y - EYES - 0.0185 + 6.0 * (side - 0.03) * (side - 0.03)) * 2.2));
@@ -108,8 +117,8 @@ Material top_cloth(int slot, vec3 at, float pixel) {
     return Material(cloth, 0.02);
 }
 
-// `piece`: what it belongs to; `at` and `normal` in rest pose.
-Material clothes(int slot, int piece, vec3 at, vec3 normal) {
+// `piece`: what it belongs to; `at` and `normal` in rest pose; `gaze`: see mesh.vert.
+Material clothes(int slot, int piece, vec3 at, vec3 normal, vec2 gaze) {
 #ifdef PIXEL
     float pixel = PIXEL;
 #else
@@ -119,7 +128,7 @@ Material clothes(int slot, int piece, vec3 at, vec3 normal) {
     if (piece == SKIN) return Material(look(slot, 0).rgb, 0.06);
     if (piece == HAIR) return Material(look(slot, 3).rgb * (0.87 + 0.25 * normal.y), 0.10);
 #else
-    if (piece == SKIN) return face(look(slot, 0), look(slot, 3).rgb, at, pixel);
+    if (piece == SKIN) return face(look(slot, 0), look(slot, 3).rgb, at, gaze, pixel);
     if (piece == HAIR) {
         float around = atan(at.x, at.z - HEAD_MIDDLE + 0.02);
         float strands = mix(noise(vec3(around * 30.0, at.y * 11.0, 3.0)), 0.5, smoothstep(0.002, 0.008, pixel));

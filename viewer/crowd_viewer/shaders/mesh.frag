@@ -12,6 +12,7 @@ void main() {}
 out uint number;
 void main() { number = uint(slot + 1); }
 #else
+flat in vec2 gaze;
 out vec4 colour;
 
 // Tilt a normal as a relief of given height, m, does. Mikkelsen, "Bump mapping unparametrized surfaces on the GPU", 2010.
@@ -28,7 +29,7 @@ void main() {
     float pixel = length(fwidth(rest_place));
     float detail = smoothstep(0.014, 0.004, pixel);
     if (detail > 0.0) normal = tilted(normal, detail * relief(slot, piece, rest_place));
-    Material material = clothes(slot, piece, rest_place, normalize(rest_normal));
+    Material material = clothes(slot, piece, rest_place, normalize(rest_normal), gaze);
     colour = displayed(hazy(lit(material.colour, material.gloss, place, normal, sky_share), place));
     if (slot == picked) colour.rgb = mix(colour.rgb, vec3(1.0, 0.72, 0.1), 0.45);
 }

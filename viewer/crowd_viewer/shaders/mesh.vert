@@ -12,6 +12,9 @@ out vec3 rest_normal;
 out float sky_share;
 flat out int piece;
 flat out int slot;
+#if !defined(SHADOW) && !defined(IDENTITY)
+flat out vec2 gaze;        // left and up in the direction in which the eye on this side looks, in the head's frame
+#endif
 
 void main() {
     int row = first + gl_InstanceID;
@@ -31,5 +34,11 @@ void main() {
     sky_share = open_sky;
     piece = int(material + 0.5);
     slot = root.slot;
+#if !defined(SHADOW) && !defined(IDENTITY)
+    int eye_joint = position.x > 0.0 ? LEFT_EYE_JOINT : RIGHT_EYE_JOINT;
+    vec4 head_turn = texelFetch(palette, palette_texel(row - palette_first, 2 * HEAD_JOINT), 0);
+    vec4 eye_turn = texelFetch(palette, palette_texel(row - palette_first, 2 * eye_joint), 0);
+    gaze = turned(vec4(head_turn.x, -head_turn.yzw), turned(eye_turn, vec3(0.0, 0.0, 1.0))).xy;
+#endif
     gl_Position = to_clip * vec4(place, 1.0);
 }

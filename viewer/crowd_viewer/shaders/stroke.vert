@@ -52,7 +52,7 @@ void main() {
     vec4 worn = texelFetch(limbs, ivec2(0, root.build), 0);
     vec2 limb = vec2(part == 1.0 || part == 2.0 ? 1.0 : 0.0, part == 2.0 ? 1.0 : 0.0);
     int piece = piece_at(rest_place, limb, vec4(worn.xyz, abs(worn.w)), worn.w > 0.0);
-    Material material = clothes(root.slot, piece, rest_place, rest_normal);
+    Material material = clothes(root.slot, piece, rest_place, rest_normal, vec2(0.0));
     shade = displayed(hazy(lit(material.colour, material.gloss, place, normal), place)).rgb;
     if (root.slot == picked) shade = mix(shade, vec3(1.0, 0.72, 0.1), 0.45);
     gl_Position = to_clip * vec4(place, 1.0);
