@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from crowd.motion.rotation import multiply, rotate
+from crowd.motion.rotation import rotate
 from crowd_kernels.reach_goal import MOVE, REACHED
 
 if TYPE_CHECKING:
@@ -52,10 +52,10 @@ class HandMetrics:
 
     def _observe_objects(self, simulation: Simulation) -> None:
         objects = simulation.objects
-        for held in np.flatnonzero(objects.holder >= 0):
+        apart = simulation.grab.holding.apart(simulation.state)
+        if apart.size:
             self._was_held = True
-            for hand in np.flatnonzero(objects.holder_hand[held]):
-                self._apart = max(self._apart, _distance_from_grip(simulation, int(held), int(hand)))
+            self._apart = max(self._apart, float(apart.max()))
         if self._was_held and simulation.time - self._sampled_at >= SAMPLE_PERIOD:
             self._sampled_at = simulation.time
             self._finger_depth = max(self._finger_depth, deepest_finger(simulation))
@@ -95,29 +95,7 @@ def hand_errors(
 ) -> FloatArray:
     """Distances of points of hands from their targets, m. (K,)"""
     state = simulation.state
-    position, rotation = hand_frames(simulation, characters, hands)
+    own = characters.astype(np.int32), hands.astype(np.int32)
+    position, rotation = simulation.grab.holding.hands_in_world(state, own)
     point = position + rotate(rotation, state.reach_point_hand[characters, hands])
     return np.asarray(np.linalg.norm(point - state.reach_target_world[characters, hands], axis=1))
-
-
-def hand_frames(
-    simulation: Simulation, characters: npt.NDArray[np.intp], hands: npt.NDArray[np.intp]
-) -> tuple[FloatArray, FloatArray]:
-    """Positions (K, 3) and rotations (K, 4) of hand joints in world space, m."""
-    state, skeleton = simulation.state, simulation.model.skeleton
-    joint = np.array([skeleton.joint("right_hand"), skeleton.joint("left_hand")])[hands]
-    half = 0.5 * state.yaw[characters]
-    zero = np.zeros_like(half)
-    turn = np.stack([np.cos(half), zero, np.sin(half), zero], axis=1)
-    position = simulation.joints.position_model[characters, joint].astype(np.float64)
-    rotation = simulation.joints.rotation_model[characters, joint].astype(np.float64)
-    return state.position_world[characters] + rotate(turn, position), multiply(turn, rotation)
-
-
-def _distance_from_grip(simulation: Simulation, item: int, hand: int) -> float:
-    """How far an object is from where its grip holds it, m."""
-    objects = simulation.objects
-    character = np.array([objects.holder[item]], np.intp)
-    position, rotation = hand_frames(simulation, character, np.array([hand], np.intp))
-    held = position[0] + rotate(rotation[0], objects.grip_position[item, hand])
-    return float(np.linalg.norm(objects.position_world[item] - held))

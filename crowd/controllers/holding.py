@@ -91,12 +91,9 @@ class Holding:
     def follow(self, state: State) -> None:
         """Move held objects with hands; between two hands they take the middle of what both ask for."""
         objects = self.objects
-        items, side = np.nonzero(objects.holder_hand)
+        items, (place, turn) = self._asked_by_hands(state)
         if items.size == 0:
             return
-        hands = objects.holder[items], side.astype(np.int32)
-        grip = objects.grip_position[items, side], objects.grip_rotation[items, side]
-        place, turn = composed(self.hands_in_world(state, hands), grip)
         objects.position_world[items], objects.rotation_world[items] = place, turn
         second = np.flatnonzero(items[1:] == items[:-1]) + 1
         if second.size:
@@ -104,6 +101,19 @@ class Holding:
             middle = turn[second] + sign * turn[second - 1]
             objects.position_world[items[second]] = 0.5 * (place[second] + place[second - 1])
             objects.rotation_world[items[second]] = middle / np.linalg.norm(middle, axis=1, keepdims=True)
+
+    def apart(self, state: State) -> FloatArray:
+        """How far objects are from where each hand that holds them has its grip, m. (A,)"""
+        items, (place, _) = self._asked_by_hands(state)
+        return np.asarray(np.linalg.norm(self.objects.position_world[items] - place, axis=1))
+
+    def _asked_by_hands(self, state: State) -> tuple[npt.NDArray[np.intp], Frames]:
+        """Held objects, once for each hand that holds them, and where the hands ask them to be."""
+        objects = self.objects
+        items, side = np.nonzero(objects.holder_hand)
+        hands = objects.holder[items], side.astype(np.int32)
+        grip = objects.grip_position[items, side], objects.grip_rotation[items, side]
+        return items, composed(self.hands_in_world(state, hands), grip)
 
 
 def composed(outer: Frames, inner: Frames) -> Frames:
