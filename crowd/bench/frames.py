@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from crowd.compilation import warm_up
 from crowd.hand_metrics import hand_errors
+from crowd.scenario.object_table import ObjectTable
 from crowd.scenario.schema import Area, Goal, Region, Scenario, Spread, WorldTable
 from crowd.simulation import Simulation, thread_count
 
@@ -32,11 +33,18 @@ LEAST_SPEED = {"walking_open": 0.8, "walking_dense": 0.02, "everything": 0.8}
 WARM_UP_SECONDS = 2.5
 HANDS_AT_WORK = ("reaching", "everything")
 """Scenes in which everyone reaches, holds and looks."""
+BALLS_IN_HANDS = ("everything",)
+"""Scenes in which everyone holds a ball in the left hand."""
+BALL_RADIUS = 0.035
+BALL_PLACE = (0.2, 1.1, 0.36)
+"""Where the left hand takes the ball: in the root frame at a stature of 1.75 m, m."""
+TAKE_SECONDS = 2.5
+"""Time that people stand and take the balls, s."""
 TARGET_SECONDS = 2.0
 MOST_REACH_ERROR = 0.03
 """Median distance of hands at work from their targets at the end, m; targets that walk are a step ahead."""
 LEAST_AT_WORK = 0.9
-"""Hands that reach at the end, over people."""
+"""Hands that reach at the end, and balls that are held, over people."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +89,9 @@ def scene(name: str, characters: int) -> Scenario:
         goals=(Goal(area=square, radius=0.8),) if walks else (),
         repeat=walks,
     )
-    return Scenario(name=name, world=WorldTable(bounds=ground), regions=(region,))
+    ball = ObjectTable(shape="sphere", radius=BALL_RADIUS, position=BALL_PLACE)
+    balls = (ball,) * characters if name in BALLS_IN_HANDS else ()
+    return Scenario(name=name, world=WorldTable(bounds=ground), regions=(region,), objects=balls)
 
 
 def measure_frames(
@@ -132,7 +142,7 @@ class Hands:
     """Keeps everyone's right hand at work: reaching, holding, and looking there.
 
     People who stand get a new target every two seconds. People who walk hold a point before the body, which
-    moves with them.
+    moves with them; where there are balls they first stand and take one each with the left hand.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -141,6 +151,21 @@ class Hands:
         self._is_walking = bool(simulation.model.placed.goal_count.any())
         self._rows = simulation.population.active(simulation.state)
         self._point = self._draw(self._rows.size)
+        if simulation.objects.count:
+            self._take_balls()
+        self._start = simulation.step_index
+
+    def _take_balls(self) -> None:
+        """Let everyone stand, grasp a ball with the left hand and take it back."""
+        simulation, rows = self._simulation, self._rows
+        items = np.arange(rows.size, dtype=np.int32)
+        simulation.objects.position_world[items] = self._in_world(rows, np.tile(BALL_PLACE, (rows.size, 1)))
+        simulation.commands.set_locomotion(rows, (0.0, 0.0, 0.0))
+        simulation.grab.grasp(simulation.state, rows, 1, items)
+        for _ in simulation.run(seconds=TAKE_SECONDS):
+            pass
+        simulation.commands.end_reach(rows, "left")
+        simulation.commands.release(rows)
 
     def ask(self) -> None:
         """Give new targets to those whose time has come, and take the targets along."""
@@ -148,22 +173,27 @@ class Hands:
         period = round(TARGET_SECONDS / simulation.dt)
         is_due = (self._rows + simulation.step_index) % period == 0
         due = self._rows[is_due]
-        if due.size and (not self._is_walking or simulation.step_index < period):
+        if due.size and (not self._is_walking or simulation.step_index < self._start + period):
             self._point[is_due] = self._draw(due.size)
-            simulation.commands.reach(due, self._in_world(due), "right")
-            simulation.gaze.look_at_point(state, due, self._in_world(due))
+            targets = self._in_world(due, self._point[due])
+            simulation.commands.reach(due, targets, "right")
+            simulation.gaze.look_at_point(state, due, targets)
         if self._is_walking:
             reaching = self._rows[state.reach_stage[self._rows, 0] > 0]
-            state.reach_target_world[reaching, 0] = self._in_world(reaching)
-            state.gaze_target_world[reaching] = self._in_world(reaching)
+            targets = self._in_world(reaching, self._point[reaching])
+            state.reach_target_world[reaching, 0] = targets
+            state.gaze_target_world[reaching] = targets
 
     def _draw(self, count: int) -> npt.NDArray[np.float64]:
         """Points before and beside the body, in the root frame at a stature of 1.75 m, m."""
         return self._random.uniform((-0.6, 0.8, 0.35), (0.1, 1.5, 0.6), (count, 3))
 
-    def _in_world(self, rows: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
+    def _in_world(
+        self, rows: npt.NDArray[np.int32], points: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
+        """Points in root frames at a stature of 1.75 m (R, 3) where these people are, m."""
         state, people = self._simulation.state, self._simulation.model.people
-        x, y, z = (self._point[rows] * (people.stature[rows] / 1.75)[:, None]).T
+        x, y, z = (points * (people.stature[rows] / 1.75)[:, None]).T
         sine, cosine = np.sin(state.yaw[rows]), np.cos(state.yaw[rows])
         away = np.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=1)
         return np.asarray(state.position_world[rows] + away)
@@ -187,6 +217,10 @@ def find_problem(simulation: Simulation, name: str) -> str:
         error = float(np.median(hand_errors(simulation, *at_work)))
         if error > MOST_REACH_ERROR:
             return f"hands are {error:.3f} m from their targets, allowed {MOST_REACH_ERROR}"
+    if name in BALLS_IN_HANDS:
+        held = int((simulation.objects.holder >= 0).sum())
+        if held < LEAST_AT_WORK * state.is_active.sum():
+            return f"only {held} balls are held"
     speed = float(np.hypot(state.velocity_world[:, 0], state.velocity_world[:, 2]).mean())
     least = LEAST_SPEED.get(name, 0.0)
     return f"mean speed is {speed:.2f} m/s, expected from {least}" if speed < least else ""
