@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crowd.motion import easing
 from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.layers import idle_crowd, key_at, play_crowd
 from tests.oracles import layers as oracle
@@ -41,6 +42,9 @@ def test_minimum_jerk_is_flat_at_its_ends():
     assert minimum_jerk(step) < 1e-10
     assert 1 - minimum_jerk(1 - step) < 1e-10
     assert minimum_jerk(0.5) == pytest.approx(0.5)
+    assert (minimum_jerk(-0.5), minimum_jerk(1.5)) == (0.0, 1.0)
+    progress = np.linspace(-0.2, 1.2, 29)
+    np.testing.assert_allclose([minimum_jerk(u) for u in progress], easing.minimum_jerk(progress), atol=1e-15)
 
 
 def run_idle(people=50, seconds=60.0, seed=3):
