@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.motion.rotation import rotate
-from crowd_kernels.reach_goal import MOVE, REACHED
+from crowd_kernels.reach_goal import REACHED
 
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
@@ -23,12 +23,13 @@ SAMPLE_PERIOD = 0.1
 class HandMetrics:
     """Accumulates figures frame by frame.
 
-    A reach is *completed* in the frame in which the hand is at its target; the error is taken in that frame.
+    Every target that a hand is sent to is *attempted*, also one on the way to another, and one that is
+    refused. It is *completed* in the first frame in which the hand is there; the error is taken then.
     """
 
     def __init__(self) -> None:
-        self._stage: npt.NDArray[np.uint8] | None = None
-        self._status: npt.NDArray[np.uint8] | None = None
+        self._sent: npt.NDArray[np.int32] | None = None
+        self._completed: npt.NDArray[np.int32] | None = None
         self._attempted = 0
         self._errors: list[float] = []
         self._apart = 0.0
@@ -40,13 +41,14 @@ class HandMetrics:
     def observe(self, simulation: Simulation) -> None:
         """Take the state after a step into account."""
         state = simulation.state
-        if self._stage is None or self._status is None:
-            self._stage, self._status = np.zeros_like(state.reach_stage), np.zeros_like(state.reach_status)
-        self._attempted += int(((state.reach_stage == MOVE) & (self._stage != MOVE)).sum())
-        is_new = (state.reach_status == REACHED) & (self._status != REACHED)
+        if self._sent is None or self._completed is None:
+            self._sent, self._completed = np.zeros_like(state.reach_count), np.zeros_like(state.reach_count)
+        self._attempted += int((state.reach_count != self._sent).sum())
+        self._sent[:] = state.reach_count
+        is_new = (state.reach_status == REACHED) & (state.reach_count != self._completed)
         if is_new.any():
             self._errors.extend(hand_errors(simulation, *np.nonzero(is_new)))
-        self._stage[:], self._status[:] = state.reach_stage, state.reach_status
+            self._completed[is_new] = state.reach_count[is_new]
         if simulation.objects.count:
             self._observe_objects(simulation)
 

@@ -23,6 +23,10 @@ ByteArray = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
 
 
+COUNTS = ("spawn_count", "visit_count", "reach_count", "_refusals")
+"""Ends of names of what goes on counting when another person enters through a slot."""
+
+
 def _array(*shape: int, dtype: Any = np.float64, fill: float = 0) -> Any:
     return field(metadata={"shape": shape, "dtype": dtype, "fill": fill})
 
@@ -148,6 +152,8 @@ class State:
     """Angle by which the eyes miss the target, saccades apart, rad. (character,)"""
     gaze_status: ByteArray = _array(dtype=np.uint8)
     """0 no target, 1 turning, 2 on target, 3 out of reach of the limits, 4 refused. (character,)"""
+    gaze_refusals: IntArray = _array(dtype=np.int32)
+    """How often a target of the gaze was refused. (character,)"""
     is_glancing: BoolArray = _array(dtype=np.bool_)
     """The gaze is an idle glance, which any wanted gaze replaces. (character,)"""
     glance_until: FloatArray = _array()
@@ -176,8 +182,16 @@ class State:
     """Stage of each hand's reach, right and left: 0 none, 1 move, 2 hold, 3 return. (character, 2)"""
     reach_status: ByteArray = _array(2, dtype=np.uint8)
     """0 none, 1 moving, 2 reached, 3 out of reach (as near as can be), 4 refused target. (character, 2)"""
+    reach_count: IntArray = _array(2, dtype=np.int32)
+    """How often each hand has been sent to a target. (character, 2)"""
+    reach_refusals: IntArray = _array(2, dtype=np.int32)
+    """How often a target of the hand was refused: when it was asked for, or when it moved. (character, 2)"""
+    reach_is_own: BoolArray = _array(2, dtype=np.bool_)
+    """The target moves with the body, so that no wall comes between. (character, 2)"""
     reach_is_blocked: BoolArray = _array(2, dtype=np.bool_)
-    """A wall lies between the shoulder and the last target that was asked for. (character, 2)"""
+    """A wall lies between the shoulder and the target. (character, 2)"""
+    reach_checked_world: FloatArray = _array(2, 3)
+    """Target for which walls were looked for last, m. (character, 2, 3)"""
     reach_target_world: FloatArray = _array(2, 3)
     """Where a point of the hand shall come, m; may change in every step. (character, 2, 3)"""
     reach_target_rotation_world: FloatArray = _array(2, 4)
@@ -244,6 +258,10 @@ class State:
     """Stage of each hand, right and left: 0 open, 1 closing, 2 holding, 3 opening. (character, 2)"""
     grab_status: ByteArray = _array(2, dtype=np.uint8)
     """How the grasp stands, see `crowd.controllers.grab.GrabStatus`. (character, 2)"""
+    grab_refusals: IntArray = _array(2, dtype=np.int32)
+    """How often a grasp or touch of the hand was refused or came to nothing. (character, 2)"""
+    grab_refusal: ByteArray = _array(2, dtype=np.uint8)
+    """`GrabStatus` that says why it was so last. (character, 2)"""
     grab_purpose: ByteArray = _array(2, dtype=np.uint8)
     """What the hand is for: 0 nothing, 1 grasp, 2 touch, 3 grasp with both, 4 wait for it. (character, 2)"""
     grab_object: IntArray = _array(2, dtype=np.int32, fill=-1)
@@ -325,7 +343,7 @@ class State:
             yield declared.name, getattr(self, declared.name)
 
     def clear(self, characters: IntArray) -> None:
-        """Set the values of these slots back to those of an empty slot; what keys random draws is kept."""
+        """Set the values of these slots back to those of an empty slot; counts are kept."""
         for declared in fields(self):
-            if declared.name not in ("spawn_count", "visit_count"):
+            if not declared.name.endswith(COUNTS):
                 getattr(self, declared.name)[characters] = declared.metadata["fill"]

@@ -104,5 +104,6 @@ class Carrying:
             state.carry_target_world[rows, hand] = place
             if begins.any():
                 self._grab.reach.start(state, rows[begins], hand, place[begins], wanted[begins], is_own=True)
+            state.reach_is_own[rows, hand] = True
             state.reach_target_world[rows, hand] = place
             state.reach_target_rotation_world[rows, hand] = wanted

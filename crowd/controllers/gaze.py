@@ -25,9 +25,11 @@ from crowd_kernels.aligned import aligned_full, aligned_zeros
 from crowd_kernels.gaze import (
     CHARACTER,
     CHUNKS,
+    IDLE,
     NOTHING,
     OBJECT,
     POINT,
+    REFUSED,
     eye_point_crowd,
     gaze_crowd,
     split_gazing,
@@ -54,6 +56,7 @@ class Gaze:
         "gaze_eye_turn",
         "gaze_error",
         "gaze_status",
+        "gaze_refusals",
         "is_glancing",
         "glance_until",
         "saccade_mode",
@@ -163,6 +166,7 @@ class Gaze:
         state.gaze_index[characters] = index
         state.gaze_trunk[characters] = trunk
         state.is_glancing[characters] = False
+        state.gaze_status[characters] = IDLE
 
     def evaluate(self, step: Step) -> None:
         """Choose glances, advance saccades, and turn everyone who looks or has just looked at something."""
@@ -262,6 +266,7 @@ class Gaze:
         held = (1.0 - self.settings.gesture_follow) * moves_head * state.play_weight[turned]
         self._follow[turned] = 1.0 - held
         capacity = state.capacity
+        was_refused = state.gaze_status[turned] == REFUSED
         gaze_crowd(
             self.arrays,
             self.limits,
@@ -286,6 +291,8 @@ class Gaze:
             state.gaze_error,
             state.gaze_status,
         )
+        is_refused = ~was_refused & (state.gaze_status[turned] == REFUSED) & ~state.is_glancing[turned]
+        state.gaze_refusals[turned[is_refused]] += 1
 
     def _object_points(self, index: IntArray) -> FloatArray:
         """Where objects are; NaN for those that do not exist."""

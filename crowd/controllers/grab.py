@@ -64,6 +64,8 @@ class GrabSettings:
     """m. A hand this near to its place on the object closes."""
     near_angle: float = 0.045
     """rad. Likewise for its rotation."""
+    slip: float = 0.05
+    """m. A hand that is farther than this from what it touched touches it no more."""
     settle_distance: float = 0.01
     """m. An object let go this near to where it was to be put is put exactly there."""
 
@@ -74,6 +76,8 @@ class Grab:
     state_fields: ClassVar[tuple[str, ...]] = (
         "grab_stage",
         "grab_status",
+        "grab_refusals",
+        "grab_refusal",
         "grab_purpose",
         "grab_object",
         "grab_giver",
@@ -299,6 +303,9 @@ class Grab:
             self._grasp_alone(state, (rows[awaits], hands[awaits]), state.grab_object[rows, hands][awaits])
             self._arrive(state, (rows[waits], hands[waits]))
         self.holding.follow(state)
+        touches = state.grab_status[rows, hands] == GrabStatus.TOUCHING
+        if touches.any():
+            self._keep_touching(state, (rows[touches], hands[touches]))
         if waits.any():
             self._follow(state, (rows[waits], hands[waits]))
 
@@ -314,7 +321,7 @@ class Grab:
             exists &= np.isfinite(objects.position_world[known]).all(axis=1)
         is_free = np.isin(state.grab_stage[rows, side], (OPEN, OPENING))
         may = exists & is_free
-        state.grab_status[rows[is_free], side[is_free]] = GrabStatus.REFUSED
+        self._refuse(state, (rows[is_free & ~exists], side[is_free & ~exists]), GrabStatus.REFUSED)
         state.grab_status[rows[may], side[may]] = GrabStatus.APPROACHING
         if not holds or not may.any():
             return np.asarray(may)
@@ -322,7 +329,7 @@ class Grab:
         is_others = may & (giver >= 0) & (giver != rows)
         offers = ((state.reach_stage[giver] != reach_goal.NONE) & objects.holder_hand[known]).any(axis=1)
         taken = is_others & ~offers
-        state.grab_status[rows[taken], side[taken]] = GrabStatus.TAKEN
+        self._refuse(state, (rows[taken], side[taken]), GrabStatus.TAKEN)
         state.grab_giver[rows, side] = np.where(may, giver, -1)
         return np.asarray(may & ~taken)
 
@@ -337,7 +344,7 @@ class Grab:
         rows, side = hands
         fits = self._place(state, hands, items, GRASP) != TOO_BIG
         self._send(state, (rows[fits], side[fits]))
-        state.grab_status[rows[~fits], side[~fits]] = GrabStatus.TOO_BIG
+        self._refuse(state, (rows[~fits], side[~fits]), GrabStatus.TOO_BIG)
 
     def _place(self, state: State, hands: Hands, items: IntArray, purpose: int) -> IntArray:
         """Choose grips for single hands; tells who is `TOO_BIG`."""
@@ -357,6 +364,8 @@ class Grab:
         if rows.size == 0:
             return
         position, rotation, fits = self.placement.of_both_hands(state, rows, items)
+        # What was too big for the first hand alone is not refused for that.
+        state.grab_refusals[rows] -= state.grab_status[rows] == GrabStatus.TOO_BIG
         for side in (0, 1):
             hands = np.full(rows.size, side, np.int32)
             state.grab_object[rows, side] = items
@@ -367,7 +376,8 @@ class Grab:
             state.finger_contact[rows, side] = 0
             state.grab_stage[rows, side] = OPEN
             state.grab_giver[rows, side] = self.objects.holder[items]
-            state.grab_status[rows, side] = np.where(fits, GrabStatus.APPROACHING, GrabStatus.TOO_BIG)
+            state.grab_status[rows, side] = GrabStatus.APPROACHING
+            self._refuse(state, (rows[~fits], hands[~fits]), GrabStatus.TOO_BIG)
             self._send(state, (rows[fits], hands[fits]))
 
     def _send(self, state: State, hands: Hands) -> None:
@@ -410,6 +420,17 @@ class Grab:
             owner = np.unique(items[pair], return_index=True)[1]
             chosen = np.isin(rows, rows[pair][owner]) & pair
             self._begin(state, (rows[chosen], side[chosen]))
+
+    def _keep_touching(self, state: State, hands: Hands) -> None:
+        """Let hands follow what they have touched, and give up what others carry away."""
+        rows, side = hands
+        place, _ = self.holding.hands_in_world(state, hands)
+        slipped = np.linalg.norm(place - self._wanted(state, hands)[0], axis=1) > self.settings.slip
+        holder = self.objects.holder[state.grab_object[hands]]
+        lost = slipped & (holder >= 0) & (holder != rows)
+        self._give_up(state, (rows[lost], side[lost]), GrabStatus.TAKEN)
+        follows = slipped & ~lost
+        state.grab_status[rows[follows], side[follows]] = GrabStatus.APPROACHING
 
     def _is_near(self, state: State, hands: Hands) -> BoolArray:
         """Who is at the grip, within `near` and `near_angle`."""
@@ -513,7 +534,14 @@ class Grab:
         if hands[0].size == 0:
             return
         self._forget(state, hands, status)
+        self._refuse(state, hands, status)
         self.reach.end(state, *hands)
+
+    def _refuse(self, state: State, hands: Hands, status: GrabStatus) -> None:
+        """Say that hands do not get what they were sent to, and why."""
+        state.grab_status[hands] = status
+        state.grab_refusal[hands] = status
+        state.grab_refusals[hands] += 1
 
     def _forget(self, state: State, hands: Hands, status: GrabStatus) -> None:
         state.grab_object[hands] = -1

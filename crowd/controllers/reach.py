@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from crowd.blending.reach_space import SIDES, ReachSpace
 from crowd.controllers.controller import Step
+from crowd.errors import MotionError, describe
 from crowd.motion.body import build_skeleton
 from crowd.motion.clip import Clip, ClipKind
 from crowd.motion.joint_tree import joint_trees
@@ -27,7 +28,7 @@ from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
 from crowd_kernels.reach import CHUNKS, reach_crowd
 from crowd_kernels.reach_blend import ROW
-from crowd_kernels.reach_correction import keep_corrections, start_solves
+from crowd_kernels.reach_correction import LANES, keep_corrections, start_solves
 from crowd_kernels.reach_goal import (
     MOVE,
     MOVING,
@@ -78,6 +79,8 @@ class ReachSettings:
     """m. A hand at this distance has reached its target; layers above leave up to 0.3 mm more."""
     angle_tolerance: float = 0.0174533
     """rad. Likewise for its rotation."""
+    wall_distance: float = 0.05
+    """m. Walls are looked for again when a target has moved as far as this."""
 
     def solve_for(self, dt: float) -> SolveSettings:
         """Settings of the solves in steps of `dt` s: motions are the same with any step."""
@@ -98,7 +101,8 @@ class Reach:
     """Moves hands to targets, holds them there and brings them back."""
 
     state_fields: ClassVar[tuple[str, ...]] = (
-        "reach_is_blocked",
+        "reach_count",
+        "reach_checked_world",
         "reach_correction",
         *(f"reach_{name}" for name in ReachState._fields),
     )
@@ -120,6 +124,7 @@ class Reach:
         self._space: ReachSpace | None = None
         self._trees = joint_trees(library.skeleton, EFFECTORS)
         self._tree = self._trees[(1 << len(EFFECTORS)) - 1]
+        require_lanes(len(self._tree.joint))
         capacity, size = len(stature), SCRATCH + MOST_SAMPLES
         self._number = aligned_zeros((CHUNKS, size), np.int32)
         self._real = aligned_zeros((CHUNKS, size))
@@ -195,18 +200,21 @@ class Reach:
         state.reach_point_hand[characters, hands] = 0.0 if point_hand is None else point_hand
         state.reach_hold_left[characters, hands] = np.inf if hold is None else hold
         state.reach_seconds[characters, hands] = 0.0 if seconds is None else seconds
+        state.reach_count[characters, hands] += 1
+        state.reach_is_own[characters, hands] = is_own
         state.reach_is_blocked[characters, hands] = False
         if not is_own:
-            self._refuse_blocked(state, characters, hands)
-        place = state.reach_target_world[characters, hands]
-        is_finite = np.isfinite(place).all(axis=1)
+            self._look_for_walls(state, characters, hands)
+        is_good = np.isfinite(state.reach_target_world[characters, hands]).all(axis=1)
+        is_good &= ~state.reach_is_blocked[characters, hands]
         is_new = state.reach_stage[characters, hands] == NONE
         rests = (state.reach_stage[characters] == NONE).all(axis=1)
         state.reach_correction[characters[rests]] = 0.0
-        state.reach_status[characters, hands] = np.where(is_finite, MOVING, REFUSED)
-        going = ~is_new | is_finite
+        state.reach_status[characters, hands] = np.where(is_good, MOVING, REFUSED)
+        state.reach_refusals[characters, hands] += ~is_good
+        going = ~is_new | is_good
         state.reach_stage[characters[going], hands[going]] = MOVE
-        rows, own = characters[is_new & is_finite], hands[is_new & is_finite]
+        rows, own = characters[is_new & is_good], hands[is_new & is_good]
         for name in (
             "offset",
             "offset_velocity",
@@ -232,8 +240,9 @@ class Reach:
                 [c * w - s * y, c * x + s * z, c * y + s * w, c * z - s * x], axis=1
             )
 
-    def _refuse_blocked(self, state: State, characters: IntArray, hands: npt.NDArray[np.intp]) -> None:
-        """Take away targets that lie behind walls."""
+    def _look_for_walls(self, state: State, characters: IntArray, hands: npt.NDArray[np.intp]) -> None:
+        """Note which targets lie behind walls."""
+        target = state.reach_target_world[characters, hands]
         shoulder = shoulders_world(
             state.position_world[characters],
             state.yaw[characters],
@@ -241,24 +250,19 @@ class Reach:
             hands,
             state.is_seated[characters],
         )
-        is_blocked = self._world.is_blocked(shoulder, state.reach_target_world[characters, hands])
-        state.reach_is_blocked[characters, hands] = is_blocked
-        state.reach_target_world[characters[is_blocked], hands[is_blocked]] = np.nan
+        state.reach_is_blocked[characters, hands] = self._world.is_blocked(shoulder, target)
+        state.reach_checked_world[characters, hands] = np.where(np.isfinite(target), target, 0.0)
 
-    def move(
-        self,
-        state: State,
-        characters: IntArray,
-        hand: npt.ArrayLike,
-        position_world: npt.ArrayLike,
-        rotation_world: npt.ArrayLike | None = None,
-    ) -> None:
-        """Give hands that reach a new target; they go there without returning."""
-        hands = np.broadcast_to(np.asarray(hand), len(characters))
-        state.reach_target_world[characters, hands] = position_world
-        if rotation_world is not None:
-            state.reach_target_rotation_world[characters, hands] = rotation_world
-            state.reach_has_rotation[characters, hands] = True
+    def _follow_moved(self, state: State, reaching: IntArray) -> None:
+        """Look for walls before targets that have moved."""
+        if not self._world.has_obstacles:
+            return
+        away = state.reach_target_world[reaching] - state.reach_checked_world[reaching]
+        moved = np.einsum("nhk,nhk->nh", away, away) > self.settings.wall_distance**2
+        moved &= ~state.reach_is_own[reaching] & (state.reach_stage[reaching] != RETURN)
+        place, hands = np.nonzero(moved & (state.reach_stage[reaching] != NONE))
+        if place.size:
+            self._look_for_walls(state, reaching[place], hands)
 
     def end(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> None:
         """Let hands return."""
@@ -273,6 +277,7 @@ class Reach:
         reaching = step.active[(stage != NONE).any(axis=1)]
         if reaching.size == 0:
             return
+        self._follow_moved(state, reaching)
         begins = (state.reach_stage == MOVE) & (state.reach_course == 0.0)
         parts = ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields))
         begin = time.perf_counter()
@@ -353,6 +358,18 @@ class Reach:
             self.settings.angle_tolerance,
             parts,
         )
+
+
+def require_lanes(joints: int) -> None:
+    """Check that corrections of so many joints have room.
+
+    Raises
+    ------
+    MotionError
+        They have not.
+    """
+    if joints > LANES:
+        raise MotionError(describe("reach", "too many joints move the hands", joints, f"at most {LANES}"))
 
 
 def reach_space(library: MotionLibrary) -> ReachSpace:

@@ -68,8 +68,10 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     """Claim the nearest free object of the name, and a place from which to reach it."""
     simulation = tasks.simulation
     _, group, _ = task_of(tasks, row)
-    items = np.array(tasks.names.groups[group])
     objects = simulation.objects
+    items = _that_are_somewhere(tasks, group)
+    if items.size == 0:
+        return Outcome.NOWHERE
     is_free = (objects.holder[items] < 0) & ((tasks.claimed_by[items] < 0) | (tasks.claimed_by[items] == row))
     has_taken = not is_free.all()
     items = items[is_free & ~np.isin(items, _delivered(tasks))]
@@ -87,6 +89,12 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     return Outcome.FAIL if outcome is Outcome.BEHIND_WALLS and has_taken else outcome
 
 
+def _that_are_somewhere(tasks: Tasks, group: int) -> npt.NDArray[np.intp]:
+    """Objects of a name, without those whose position is not finite."""
+    items = np.array(tasks.names.groups[group], np.intp)
+    return items[np.isfinite(tasks.simulation.objects.position_world[items]).all(axis=1)]
+
+
 def _delivered(tasks: Tasks) -> IntArray:
     """Objects that somebody has put down; a family name does not mean them any more."""
     return np.flatnonzero(tasks.is_delivered).astype(np.int32)
@@ -99,7 +107,9 @@ def choose_touch(tasks: Tasks, row: int, time: float) -> Outcome:
     tasks.hand[row] = free_hand(tasks, row)
     tasks.object[row] = -1
     if kind is Target.OBJECTS:
-        items = np.array(tasks.names.groups[group])
+        items = _that_are_somewhere(tasks, group)
+        if items.size == 0:
+            return Outcome.NOWHERE
         position = simulation.objects.position_world[items]
         nearest = int(np.argmin(np.linalg.norm(position - simulation.state.position_world[row], axis=1)))
         tasks.object[row] = items[nearest]
@@ -240,7 +250,9 @@ def choose_look(tasks: Tasks, row: int, time: float) -> Outcome:
     tasks.target_world[row] = point
     tasks.object[row] = -1
     if kind is Target.OBJECTS:
-        items = np.array(tasks.names.groups[target])
+        items = _that_are_somewhere(tasks, target)
+        if items.size == 0:
+            return Outcome.NOWHERE
         away = simulation.objects.position_world[items] - simulation.state.position_world[row]
         tasks.object[row] = items[int(np.argmin(np.linalg.norm(away, axis=1)))]
     return Outcome.NEXT

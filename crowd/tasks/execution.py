@@ -35,6 +35,7 @@ LOOK_AGAIN_AFTER = 1.0
 """Time between two of these, s."""
 HOPELESS = {
     Outcome.EMPTY_HANDED: "the hands are empty",
+    Outcome.NOWHERE: "the object is nowhere",
     Outcome.BEHIND_WALLS: "obstacles are in the way from every place to stand",
 }
 """Why tasks fail without another look."""

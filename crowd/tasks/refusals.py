@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.controllers.grab import GrabStatus
-from crowd.state import BoolArray
+from crowd.state import IntArray
 from crowd.tasks.events import EventKind
-from crowd_kernels import gaze, reach_goal
 
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
@@ -26,54 +25,61 @@ REASONS = {
 
 
 class Refusals:
-    """Compares the statuses of hands and eyes with those of the step before.
+    """Compares how often hands and eyes were refused with what has been told.
 
     Attributes
     ----------
-    reach, grab : (N, 2) bool
-        Hands that were refused in the step before.
-    gaze : (N,) bool
-        Likewise the eyes.
+    reach, grab : (N, 2) int32
+        Refusals of hands until the step before.
+    gaze : (N,) int32
+        Likewise of the eyes.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         capacity = simulation.model.capacity
-        self.reach: BoolArray = np.zeros((capacity, 2), np.bool_)
-        self.grab: BoolArray = np.zeros((capacity, 2), np.bool_)
-        self.gaze: BoolArray = np.zeros(capacity, np.bool_)
+        self.reach: IntArray = np.zeros((capacity, 2), np.int32)
+        self.grab: IntArray = np.zeros((capacity, 2), np.int32)
+        self.gaze: IntArray = np.zeros(capacity, np.int32)
 
     def state_fields(self) -> dict[str, npt.NDArray[Any]]:
         """Arrays that change in a run."""
         return {"reach": self.reach, "grab": self.grab, "gaze": self.gaze}
 
     def tell(self, time: float) -> None:
-        """Add an event for each hand or pair of eyes that has been refused since the last step."""
+        """Add an event for each refusal since the last step."""
         state = self._simulation.state
-        reach = (state.reach_status == reach_goal.REFUSED) & state.is_active[:, None]
-        grab = np.isin(state.grab_status, tuple(REASONS)) & state.is_active[:, None]
-        eyes = (state.gaze_status == gaze.REFUSED) & ~state.is_glancing & state.is_active
-        new_grab = grab & ~self.grab
-        for row, hand in np.argwhere(new_grab):
-            status = GrabStatus(int(state.grab_status[row, hand]))
-            self._add(time, int(row), "grab", self._reach_reason(row, hand) or REASONS[status])
-        for row, hand in np.argwhere(reach & ~self.reach & ~new_grab):
-            self._add(time, int(row), "reach", self._reach_reason(row, hand))
-        for row in np.flatnonzero(eyes & ~self.gaze):
+        reach, grab = state.reach_refusals - self.reach, state.grab_refusals - self.grab
+        for row, hand in np.argwhere((grab > 0) & state.is_active[:, None]):
+            why = GrabStatus(int(state.grab_refusal[row, hand]))
+            # A hand that could not go to the object: the layer that moves it knows more.
+            by_reach = why is GrabStatus.REFUSED and reach[row, hand] > 0
+            reason = self._reach_reason(row, hand) if by_reach else REASONS[why]
+            self._add(time, int(row), "grab", reason, int(grab[row, hand]))
+        for row, hand in np.argwhere((reach > 0) & (grab <= 0) & state.is_active[:, None]):
+            self._add(time, int(row), "reach", self._reach_reason(row, hand), int(reach[row, hand]))
+        eyes = state.gaze_refusals - self.gaze
+        for row in np.flatnonzero((eyes > 0) & state.is_active):
             is_finite = np.isfinite(state.gaze_target_world[row]).all()
-            self._add(time, int(row), "gaze", "the target is too near" if is_finite else "there is no target")
-        self.reach[:], self.grab[:], self.gaze[:] = reach, grab, eyes
+            why_not = "the target is too near" if is_finite else "there is no target"
+            self._add(time, int(row), "gaze", why_not, int(eyes[row]))
+        self.reach[:], self.grab[:], self.gaze[:] = (
+            state.reach_refusals,
+            state.grab_refusals,
+            state.gaze_refusals,
+        )
 
-    def _add(self, time: float, row: int, layer: str, why: str) -> None:
+    def _add(self, time: float, row: int, layer: str, why: str, count: int) -> None:
         tasks = self._simulation.tasks
         has_task = bool(tasks.has_more(np.array([row], np.int32))[0])
-        tasks.events.add(time, row, EventKind.TARGET_REFUSED, tasks.present(row) if has_task else layer, why)
+        for _ in range(count):
+            tasks.events.add(
+                time, row, EventKind.TARGET_REFUSED, tasks.present(row) if has_task else layer, why
+            )
 
     def _reach_reason(self, row: int, hand: int) -> str:
-        """Why the reach layer refuses the target of a hand; empty when it does not."""
+        """Why the reach layer refuses the target of a hand."""
         state = self._simulation.state
-        if state.reach_status[row, hand] != reach_goal.REFUSED:
-            return ""
         if state.reach_is_blocked[row, hand]:
             return BLOCKED
         if not np.isfinite(state.reach_target_world[row, hand]).all():

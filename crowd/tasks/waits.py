@@ -41,6 +41,8 @@ class Outcome(Enum):
     """Obstacles keep the hands away from it, wherever one stands."""
     ALONE = 5
     """The other person has no task for it."""
+    NOWHERE = 6
+    """The object has no place."""
 
 
 class Wait(IntEnum):

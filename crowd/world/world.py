@@ -80,6 +80,11 @@ class World:
         """Obstacles that are there now."""
         return tuple(self._obstacles.values())
 
+    @property
+    def has_obstacles(self) -> bool:
+        """Whether anything is in the way now."""
+        return bool(self._obstacles)
+
     def add_obstacle(self, shape: Shape) -> int:
         """Put an obstacle down; returns its number for `remove_obstacle`."""
         number = self._next_number

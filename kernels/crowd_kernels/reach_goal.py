@@ -66,6 +66,12 @@ class ReachState(NamedTuple):
 
     stage: npt.NDArray[np.uint8]
     status: npt.NDArray[np.uint8]
+    refusals: npt.NDArray[np.int32]
+    """(N, 2) How often targets were refused."""
+    is_own: npt.NDArray[np.bool_]
+    """(N, 2) Targets move with the body: no wall comes between."""
+    is_blocked: npt.NDArray[np.bool_]
+    """(N, 2) A wall lies between the shoulder and the target."""
     target_world: npt.NDArray[np.float64]
     target_rotation_world: npt.NDArray[np.float64]
     has_rotation: npt.NDArray[np.bool_]
@@ -386,19 +392,23 @@ def track_target(
     if wants:
         turned = multiply(facing, quaternion_of(state.target_rotation_world, character, arm))
     length = turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3]
-    is_bad = not math.isfinite(target[0] + target[1] + target[2])
+    is_bad = state.is_blocked[character, arm] and not state.is_own[character, arm]
+    is_bad = is_bad or not math.isfinite(target[0] + target[1] + target[2])
     is_bad = is_bad or not (length > 0.5 and length < 2.0)
     is_bad = is_bad or is_inside_body(target, pelvis, size, limits.body_radius)
     if is_bad:
-        state.status[character, arm] = REFUSED
+        if state.status[character, arm] != REFUSED:
+            state.status[character, arm] = REFUSED
+            state.refusals[character, arm] += 1
         target = vector_of(state.seen, character, arm)
         turned = quaternion_of(state.rotation, character, arm)
     elif state.status[character, arm] == REFUSED:
         state.status[character, arm] = MOVING
     follow_target(character, arm, target, normalized(turned), limits, dt, state)
     share = state.rotation_share[character, arm]
+    asked = share if is_bad else (1.0 if wants else 0.0)
     step = limits.rotation_rate * dt
-    state.rotation_share[character, arm] = share + min(max((1.0 if wants else 0.0) - share, -step), step)
+    state.rotation_share[character, arm] = share + min(max(asked - share, -step), step)
 
 
 @inlined_kernel
@@ -464,7 +474,7 @@ def advance_course(
 def course_shares(course: float, lead: float) -> tuple[float, float]:
     """Find the share of the examples in the pose, and that of the correction of the hand, on a course."""
     side = course if course <= APEX else END - course
-    return minimum_jerk(min(side / lead, 1.0)), minimum_jerk(min(max(side, 0.0), 1.0))
+    return minimum_jerk(side / lead), minimum_jerk(side)
 
 
 @inlined_kernel
@@ -493,15 +503,18 @@ def judge_hand(
     All other arguments are those of `reach_status_crowd`.
     """
     stage = state.stage[character, arm]
-    if stage in (NONE, RETURN) or state.status[character, arm] == REFUSED:
+    if stage in (NONE, RETURN):
         return
+    is_refused = state.status[character, arm] == REFUSED
     if stage == MOVE:
-        state.status[character, arm] = MOVING
+        if not is_refused:
+            state.status[character, arm] = MOVING
         return
     is_met = distance < tolerance
     if state.has_rotation[character, arm] and angle >= angle_tolerance:
         is_met = False
-    state.status[character, arm] = REACHED if is_met else OUT_OF_REACH
+    if not is_refused:
+        state.status[character, arm] = REACHED if is_met else OUT_OF_REACH
     state.hold_left[character, arm] -= dt
     if state.hold_left[character, arm] < 0.0:
         state.stage[character, arm] = RETURN

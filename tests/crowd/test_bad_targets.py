@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import crowd
+from crowd.bench.reach import LARGEST_RATIO, angular_motion
 from crowd.controllers.grab import GrabStatus
 from crowd.motion.rotation import conjugate, multiply
 from crowd.motion.swing_twist import FINGERS, swing_twist_limits
@@ -16,6 +17,9 @@ NAN = float("nan")
 INSIDE = (0.0, 1.2, 0.02)
 BEHIND = (0.1, 1.2, 0.62)
 BEFORE = (-0.2, 1.15, 0.35)
+LEGS = ("thigh", "shank", "foot", "toe")
+EXAMPLE_ACCELERATION = 50.0
+"""Largest of any joint in the built-in reaches, rad/s^2."""
 CLEAR = "obstacles are in the way from every place to stand"
 
 
@@ -58,9 +62,14 @@ def beyond_limits(simulation):
     return float(np.maximum(beyond, turned)[:, is_limited > 0].max())
 
 
-def watch(simulation, seconds, until=lambda: False):
-    """Run, and look at every pose."""
+def watch(simulation, seconds, until=lambda: False, poses=None):
+    """Run, and look at every pose; keep those of trunk and arms, which reach, if wanted."""
+    names = np.array(simulation.model.skeleton.joint_names)
+    joints = simulation.reach.space.keys.joint
+    joints = joints[[not any(part in name for part in LEGS) for name in names[joints]]]
     for _ in simulation.run(seconds=seconds):
+        if poses is not None:
+            poses.append(simulation.joint_rotations_local()[:, joints])
         assert np.isfinite(simulation.state.pose_rotation).all()
         assert np.isfinite(simulation.joint_positions_world()).all()
         assert beyond_limits(simulation) < 0.01
@@ -92,25 +101,92 @@ both_rates = pytest.mark.parametrize("dt", [1 / 30, 1 / 60])
     ],
 )
 def test_bad_reaches_are_refused_from_rest_and_on_the_way(dt, target, rotation, detail):
-    simulation = scene(dt)
+    simulation, poses = scene(dt), []
     state, commands = simulation.state, simulation.commands
-    watch(simulation, 0.3)
+    watch(simulation, 0.3, poses=poses)
     commands.reach(0, target, "right", rotation_world=rotation)
     before = hand_place(simulation)
-    watch(simulation, 1.0)
+    watch(simulation, 1.0, poses=poses)
     assert state.reach_status[0, 0] == reach_goal.REFUSED
     assert told(simulation) == [("target_refused", 0, "reach", detail)]
     assert np.linalg.norm(hand_place(simulation) - before) < 0.02
     commands.reach(0, BEFORE, "right")
-    watch(simulation, 0.4)
+    watch(simulation, 0.4, poses=poses)
     commands.reach(0, target, "right", rotation_world=rotation)
-    watch(simulation, 1.5)
+    watch(simulation, 1.5, poses=poses)
     assert state.reach_status[0, 0] == reach_goal.REFUSED
     assert told(simulation)[1:] == [("target_refused", 0, "reach", detail)]
     assert np.linalg.norm(hand_place(simulation) - BEFORE) < 0.15
     commands.end_reach(0)
-    watch(simulation, 2.0)
+    watch(simulation, 2.0, poses=poses)
     assert (state.reach_stage[0] == reach_goal.NONE).all()
+    _, acceleration = angular_motion(np.array(poses, float), dt)
+    assert acceleration < LARGEST_RATIO * EXAMPLE_ACCELERATION
+    attempted = simulation.metrics.as_dict()["reach.attempted"]
+    assert attempted == 3
+
+
+@both_rates
+def test_each_refusal_is_told_with_its_own_reason(dt):
+    simulation = scene(dt)
+    commands = simulation.commands
+    for target in ((NAN, 1.0, 1.0), INSIDE, BEHIND, BEHIND):
+        commands.reach(0, target, "right")
+        watch(simulation, 0.3)
+    assert [detail for _, _, _, detail in told(simulation)] == [
+        "the target is not finite",
+        "the target is inside the body",
+        "a wall is in the way",
+        "a wall is in the way",
+    ]
+    for _ in range(2):
+        commands.look_at(0, (NAN, 1.0, 1.0))
+        watch(simulation, 0.3)
+    assert told(simulation)[4:] == 2 * [("target_refused", 0, "gaze", "there is no target")]
+
+
+@both_rates
+def test_what_is_asked_stays_in_the_state_and_free_targets_are_taken_up(dt):
+    simulation = scene(dt)
+    state = simulation.state
+    simulation.commands.reach(0, BEHIND, "right")
+    watch(simulation, 0.2)
+    assert state.reach_target_world[0, 0].tolist() == list(BEHIND)
+    assert state.reach_is_blocked[0, 0]
+    simulation.commands.reach(0, BEFORE, "right")
+    watch(simulation, 0.4)
+    state.reach_target_world[0, 0] = BEHIND
+    watch(simulation, 1.5)
+    assert state.reach_status[0, 0] == reach_goal.REFUSED
+    assert told(simulation)[1:] == [("target_refused", 0, "reach", "a wall is in the way")]
+    assert hand_place(simulation)[2] < 0.45
+    state.reach_target_world[0, 0] = BEFORE
+    watch(simulation, 1.5)
+    assert state.reach_status[0, 0] == reach_goal.REACHED
+    assert len(told(simulation)) == 2
+
+
+@both_rates
+@pytest.mark.parametrize("target", [(NAN, 1.0, 0.3), INSIDE, BEHIND])
+def test_a_hand_that_is_refused_on_its_way_returns_after_its_time(dt, target):
+    simulation = scene(dt)
+    simulation.commands.reach(0, BEFORE, "right", hold=0.5)
+    watch(simulation, 0.4)
+    simulation.commands.reach(0, target, "right", hold=0.5)
+    watch(simulation, 4.0)
+    assert (simulation.state.reach_stage[0] == reach_goal.NONE).all()
+
+
+@both_rates
+def test_things_that_move_behind_a_wall_are_not_followed(dt):
+    simulation = scene(dt)
+    simulation.commands.grasp(0, "ball", "right")
+    watch(simulation, 0.3)
+    simulation.objects.position_world[0] = BEHIND
+    watch(simulation, 1.5)
+    assert simulation.state.grab_status[0, 0] == GrabStatus.REFUSED
+    assert told(simulation) == [("target_refused", 0, "grab", "a wall is in the way")]
+    assert hand_place(simulation)[2] < 0.45
 
 
 @both_rates
@@ -146,6 +222,42 @@ def test_what_somebody_else_holds_is_not_taken(dt):
     watch(simulation, 1.0)
     assert simulation.state.grab_status[1, 0] == GrabStatus.TAKEN
     assert told(simulation) == [("target_refused", 1, "grab", "somebody else holds the object")]
+    simulation.commands.reach(1, (NAN, 1.0, 0.3), "right")
+    watch(simulation, 0.3)
+    simulation.commands.grasp(1, "ball", "right")
+    watch(simulation, 0.3)
+    assert told(simulation)[1:] == [
+        ("target_refused", 1, "reach", "the target is not finite"),
+        ("target_refused", 1, "grab", "somebody else holds the object"),
+    ]
+
+
+@both_rates
+def test_what_is_touched_is_followed_until_somebody_else_has_it(dt):
+    simulation = scene(dt, ball=(-0.2, 1.15, 0.4), walls=(), other=(0, 0.9))
+    state, ball = simulation.state, simulation.objects.position_world[0]
+    simulation.commands.touch(0, "ball", "right")
+    watch(simulation, 2.0)
+    assert state.grab_status[0, 0] == GrabStatus.TOUCHING
+    ball[1] += 0.1
+    watch(simulation, 1.5)
+    assert state.grab_status[0, 0] == GrabStatus.TOUCHING
+    assert np.linalg.norm(hand_place(simulation) - ball) < 0.2
+    assert told(simulation) == []
+    simulation.objects.holder[0], simulation.objects.holder_hand[0] = 1, (True, False)
+    watch(simulation, 2.0)
+    assert state.grab_status[0, 0] == GrabStatus.TAKEN
+    assert (state.reach_stage[0] == reach_goal.NONE).all()
+    assert told(simulation) == [("target_refused", 0, "grab", "somebody else holds the object")]
+
+
+@both_rates
+@pytest.mark.parametrize("action", ["pick_up", "touch", "look_at"])
+def test_tasks_about_things_that_are_nowhere_fail_with_a_line(dt, action):
+    simulation = scene(dt, tasks=[{action: "ball"}])
+    simulation.objects.position_world[0] = NAN
+    watch(simulation, 2.0, lambda: bool(simulation.state.is_finished[0]))
+    assert told(simulation) == [("task_failed", 0, action, "the object is nowhere")]
 
 
 @both_rates

@@ -226,7 +226,7 @@ def test_walking_people_reach_with_the_upper_body_alone():
         ahead = reacher.state.position_world[0] + np.array([-0.3, 1.2, 0.45])
         if frame == 0:
             reacher.commands.reach(0, ahead, "right")
-        reacher.reach.move(reacher.state, np.array([0]), 0, ahead)
+        reacher.state.reach_target_world[0, 0] = ahead
         walker.step()
         reacher.step()
     assert reacher.state.reach_status[0, 0] == 2

@@ -141,4 +141,7 @@ def test_status_tells_how_a_reach_stands():
     assert status_after(HOLD, 1, math.inf, 0.0) == (OUT_OF_REACH, HOLD)
     assert status_after(HOLD, REFUSED, 0.0, 0.0) == (REFUSED, HOLD)
     assert status_after(HOLD, 1, 0.0, 0.0, hold=0.05) == (REACHED, RETURN)
+    assert status_after(MOVE, REFUSED, 0.0, 0.0, hold=0.05) == (REFUSED, MOVE)
+    assert status_after(HOLD, REFUSED, 0.0, 0.0, hold=0.05) == (REFUSED, RETURN)
+    assert status_after(HOLD, REFUSED, 0.0, 0.0, hold=0.15) == (REFUSED, HOLD)
     assert status_after(RETURN, REACHED, 0.5, 0.0) == (REACHED, RETURN)
