@@ -143,6 +143,8 @@ class Simulation:
         self.commands = Commands(self)
         self.tasks = Tasks(self)
         self.refusals = Refusals(self)
+        if bodies == "people" and (self.objects.count or self.tasks.lists.count.any()):
+            self.reach.prepare()
         self.metrics = Metrics()
         self.stage_seconds = dict.fromkeys(STAGES, 0.0)
         layers = (*self.controllers, self.constraint)

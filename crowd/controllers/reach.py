@@ -145,10 +145,15 @@ class Reach:
 
     @property
     def space(self) -> ReachSpace:
-        """The examples and what fills the space between them; made when somebody first reaches."""
+        """The examples and what fills the space between them."""
+        self.prepare()
+        assert self._space is not None
+        return self._space
+
+    def prepare(self) -> None:
+        """Make the space of the examples, which takes seconds; without it the first reach of a run does."""
         if self._space is None:
             self._space = reach_space(self._library)
-        return self._space
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people with hanging arms."""

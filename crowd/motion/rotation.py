@@ -31,8 +31,15 @@ def conjugate(rotation: FloatArray) -> FloatArray:
 def rotate(rotation: FloatArray, vector: npt.ArrayLike) -> FloatArray:
     """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
     axis, start = rotation[..., 1:], np.asarray(vector, dtype=np.float64)
-    twice = 2.0 * np.cross(axis, start)
-    return np.asarray(start + rotation[..., :1] * twice + np.cross(axis, twice))
+    twice = 2.0 * _cross(axis, start)
+    return np.asarray(start + rotation[..., :1] * twice + _cross(axis, twice))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product of vectors (..., 3), with the bits of `numpy.cross` and a third of its time for few."""
+    a_x, a_y, a_z = a[..., 0], a[..., 1], a[..., 2]
+    b_x, b_y, b_z = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x], axis=-1)
 
 
 def about(axis: int, angle: npt.ArrayLike) -> FloatArray:

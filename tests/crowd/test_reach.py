@@ -5,9 +5,12 @@ import pytest
 
 import crowd
 from crowd.bench.reach import Reachers
-from crowd.errors import SettingsError
+from crowd.controllers.reach import require_lanes
+from crowd.errors import MotionError, SettingsError
 from crowd.motion.rotation import conjugate, multiply, to_vector
+from crowd.scenario.object_table import ObjectTable
 from crowd.scenario.schema import Area, Character, Goal, Scenario, WorldTable
+from crowd_kernels.reach_correction import LANES
 
 GROUND = WorldTable(bounds=Area(x=(-20, 20), z=(-20, 20)))
 FRAMES = 90
@@ -294,3 +297,18 @@ def test_commands_refuse_what_cannot_be(keys, part):
     with pytest.raises(SettingsError) as caught:
         simulation.commands.reach(0, **({"target_world": (0.3, 1.2, 0.4)} | keys))
     assert part in str(caught.value)
+
+
+def test_examples_are_ready_before_the_first_step_where_there_is_something_to_reach():
+    ball = ObjectTable(shape="sphere", radius=0.04, position=(0.0, 1.0, 0.4))
+    for objects in ((), (ball,)):
+        scenario = Scenario(
+            name="ready", world=GROUND, characters=(Character(position=(0, 0)),), objects=objects
+        )
+        assert (crowd.Simulation(scenario, seed=1).reach._space is not None) == bool(objects)
+
+
+def test_too_many_joints_for_the_corrections_are_refused():
+    require_lanes(LANES)
+    with pytest.raises(MotionError, match="too many joints move the hands; got 33; allowed at most 32"):
+        require_lanes(LANES + 1)
