@@ -13,6 +13,8 @@ from crowd_kernels.reach import reach_crowd
 from crowd_kernels.reach_goal import (
     HOLD,
     MOVE,
+    MOVING,
+    NONE,
     OUT_OF_REACH,
     REACHED,
     REFUSED,
@@ -131,6 +133,19 @@ def status_after(stage, status, distance, angle, has_rotation=False, hold=math.i
         np.zeros((1, 2, 3), np.float32), far, turned, np.zeros(1, np.int32), 0.1, 1e-3, 0.0175, state
     )
     return int(state.status[0, 0]), int(state.stage[0, 0])
+
+
+@given(
+    stage=st.sampled_from((NONE, MOVE, HOLD, RETURN)),
+    status=st.sampled_from((0, MOVING, REACHED, OUT_OF_REACH, REFUSED)),
+    distance=st.sampled_from((0.0, 5e-4, 2e-3, math.inf)),
+    angle=st.sampled_from((0.0, 1.0)),
+    has_rotation=st.booleans(),
+    hold=st.sampled_from((0.0, 0.05, 0.15, math.inf)),
+)
+def test_status_matches_oracle(stage, status, distance, angle, has_rotation, hold):
+    wanted = oracle.status(stage, status, distance < 1e-3, angle < 0.0175 or not has_rotation, hold - 0.1)
+    assert status_after(stage, status, distance, angle, has_rotation, hold) == wanted
 
 
 def test_status_tells_how_a_reach_stands():

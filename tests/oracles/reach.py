@@ -76,3 +76,11 @@ def reach(keys, weights, arm, course, lead, goal, scale, live, live_pelvis):
     there, _ = place_hand(keys, arm, scale, leg * apex_pelvis, apex)
     target = goal if course == 1 else here + minimum_jerk(side) * (goal - there)
     return pose, pelvis, target
+
+
+def status(stage, before, is_there, is_turned, hold_left):
+    """Status and stage after a step, by name: 0 none, 1 move, 2 hold, 3 return; 2 met, 3 not, 4 refused."""
+    after = {1: 1, 2: 2 if is_there and is_turned else 3}.get(stage, before)
+    if stage in (1, 2) and before == 4:
+        after = 4
+    return after, 3 if stage == 2 and hold_left < 0 else stage
