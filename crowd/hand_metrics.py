@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from crowd.controllers.grab import HOLDING
 from crowd.motion.rotation import rotate
 from crowd_kernels.reach_goal import REACHED
 
@@ -34,6 +35,7 @@ class HandMetrics:
         self._errors: list[float] = []
         self._apart = 0.0
         self._finger_depth = 0.0
+        self._measured_holder: npt.NDArray[np.int32] | None = None
         self._sampled_at = -np.inf
         self._was_held = False
         self._placed_error = np.nan
@@ -60,8 +62,26 @@ class HandMetrics:
             self._apart = max(self._apart, float(apart.max()))
         if self._was_held and simulation.time - self._sampled_at >= SAMPLE_PERIOD:
             self._sampled_at = simulation.time
-            self._finger_depth = max(self._finger_depth, deepest_finger(simulation))
+            self._finger_depth = max(self._finger_depth, self._deepest_finger(simulation))
         self._placed_error = float(np.fmax(self._placed_error, np.fmax.reduce(objects.release_error)))
+
+    def _deepest_finger(self, simulation: Simulation) -> float:
+        """How deep the deepest finger is in the object that its hand holds, m; 0 outside.
+
+        A hand that alone holds an object keeps its fingers where they are, and is measured once.
+        """
+        objects, state = simulation.objects, simulation.state
+        if self._measured_holder is None:
+            self._measured_holder = np.full(objects.count, -1, np.int32)
+        is_alone = objects.holder_hand.sum(axis=1) == 1
+        is_known = is_alone & (self._measured_holder == objects.holder)
+        item, hand = np.nonzero(objects.holder_hand & ~is_known[:, None])
+        rows = objects.holder[item]
+        is_still = is_alone[item] & (state.grab_stage[rows, hand] == HOLDING)
+        self._measured_holder[~is_known] = -1
+        self._measured_holder[item[is_still]] = rows[is_still]
+        gaps = simulation.grab.finger_gaps(state, rows, hand.astype(np.int32))
+        return max(0.0, -float(gaps.min(initial=0.0)))
 
     def as_dict(self) -> dict[str, float | int]:
         """Figures that the run exercised, by dotted key."""
@@ -80,16 +100,6 @@ class HandMetrics:
         if np.isfinite(self._placed_error):
             result["placed.error_mm.max"] = MILLIMETRE * self._placed_error
         return result
-
-
-def deepest_finger(simulation: Simulation) -> float:
-    """How deep the deepest finger is in the object that its hand holds, m; 0 outside."""
-    objects = simulation.objects
-    item, hand = np.nonzero(objects.holder_hand & (objects.holder >= 0)[:, None])
-    if item.size == 0:
-        return 0.0
-    gaps = simulation.grab.finger_gaps(simulation.state, objects.holder[item], hand.astype(np.int32))
-    return max(0.0, -float(gaps.min()))
 
 
 def hand_errors(
