@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scipy.spatial import Delaunay, cKDTree
 from scipy.stats import qmc
 
+from crowd.blending.reach_cubes import along_curve, divide_space
 from crowd.errors import MotionError, describe
 from crowd.motion.clip import Clip
 from crowd.motion.clip_table import rows, sample_keys
@@ -22,9 +23,10 @@ from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.reach_blend import LANES, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
 from crowd_kernels.reach_space import (
     BLENDED,
+    BLOCK,
     CHUNKS,
-    LEAF_POINTS,
     MOST_SAMPLES,
+    NEAREST,
     SCRATCH,
     ReachArrays,
     find_examples_crowd,
@@ -164,8 +166,8 @@ class ReachSpace:
         sets = np.ascontiguousarray(np.broadcast_to(np.asarray(part, np.int32), len(points)))
         clip = np.zeros((len(points), MOST_SAMPLES), np.int32)
         weight, count = np.zeros((len(points), MOST_SAMPLES)), np.zeros(len(points), np.int32)
-        near, distance = np.zeros((CHUNKS, SCRATCH), np.int32), np.zeros((CHUNKS, SCRATCH))
-        find_examples_crowd(self.arrays, sets, points, near, distance, clip, weight, count)
+        near, real = np.zeros((CHUNKS, NEAREST), np.int32), np.zeros((CHUNKS, SCRATCH))
+        find_examples_crowd(self.arrays, sets, points, near, real, clip, weight, count)
         weight[np.arange(MOST_SAMPLES) >= count[:, None]] = 0.0
         return clip, weight
 
@@ -360,56 +362,39 @@ def spaced(point: FloatArray, spacing: float) -> npt.NDArray[np.intp]:
 
 def pack(pseudo: Sequence[PseudoExamples], starts: npt.NDArray[np.integer]) -> ReachArrays:
     """Prepare sets for the look-up kernel; `starts` numbers the first example of each set."""
-    point: list[FloatArray] = []
-    clip, weight, box, leaf_start, leaf_count = [], [], [], [], []
-    for part, start in zip(pseudo, starts[:-1], strict=True):
-        order, leaves = tree_order(part.point)
-        begin = sum(len(entry) for entry in point)
-        point.append(part.point[order])
-        clip.append(part.clip[order] + start)
-        weight.append(part.weight[order])
-        box.append(node_boxes(part.point[order], leaves))
-        count = len(leaves) - 1
-        leaf_count.append(count)
-        leaf_start.append(np.concatenate([np.zeros(count, np.int64), leaves + begin]))
-    nodes = np.concatenate([[0], np.cumsum([len(entry) for entry in box])[:-1]])
+    orders = [along_curve(part.point, SPACING) for part in pseudo]
+    sets = [
+        replace(part, point=part.point[order], clip=part.clip[order], weight=part.weight[order])
+        for part, order in zip(pseudo, orders, strict=True)
+    ]
+    low = np.array([part.point.min(axis=0) - MARGIN for part in sets])
+    high = np.array([part.point.max(axis=0) + MARGIN for part in sets])
+    spaces = [divide_space(part.point, *corners) for part, *corners in zip(sets, low, high, strict=True)]
+    clip = [part.clip + start for part, start in zip(sets, starts[:-1], strict=True)]
+    point = np.concatenate([part.point for part in sets])
+    candidate = joined([part.candidate for part in spaces], [len(part.point) for part in sets])
+    length = np.concatenate([np.diff(part.start) for part in spaces])
     return ReachArrays(
-        aligned_copy(np.concatenate(point).T),
+        aligned_copy(np.pad(point, ((0, 0), (0, 1)))),
         np.concatenate(clip).astype(np.int32),
-        np.ascontiguousarray(np.concatenate(weight)),
-        np.array([part.point.min(axis=0) - MARGIN for part in pseudo]),
-        np.array([part.point.max(axis=0) + MARGIN for part in pseudo]),
-        nodes.astype(np.int32),
-        np.array(leaf_count, np.int32),
-        np.ascontiguousarray(np.concatenate(box)),
-        np.concatenate(leaf_start).astype(np.int32),
+        np.ascontiguousarray(np.concatenate([part.weight for part in sets])),
+        low,
+        high,
+        np.array([part.along for part in spaces], np.int32),
+        np.cumsum([0, *(len(part.shift) for part in spaces[:-1])]).astype(np.int32),
+        np.stack(
+            [
+                joined([part.first for part in spaces], [len(part.start) - 1 for part in spaces]),
+                np.concatenate([part.shift for part in spaces]),
+            ],
+            axis=1,
+        ).astype(np.int32),
+        np.concatenate([[0], np.cumsum(length)]).astype(np.int32),
+        np.pad(candidate, (0, BLOCK)).astype(np.uint16 if len(point) <= 1 << 16 else np.uint32),
     )
 
 
-def tree_order(point: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.int64]]:
-    """Sort points (P, 3) into the leaves of a balanced tree: order, and first place of each leaf."""
-    depth = max(int(np.ceil(np.log2(max(len(point), 1) / LEAF_POINTS))), 0)
-    parts = [np.arange(len(point))]
-    for _ in range(depth):
-        halves = []
-        for part in parts:
-            axis = int(np.argmax(np.ptp(point[part], axis=0))) if len(part) else 0
-            ordered = part[np.argsort(point[part, axis], kind="stable")]
-            halves += [ordered[: len(part) // 2], ordered[len(part) // 2 :]]
-        parts = halves
-    return np.concatenate(parts), np.concatenate([[0], np.cumsum([len(part) for part in parts])])
-
-
-def node_boxes(point: FloatArray, leaves: npt.NDArray[np.int64]) -> FloatArray:
-    """Boxes of the nodes of a tree, (2 L + 1, 6): row 0 is not used, row 1 the root, the last row spare."""
-    count = len(leaves) - 1
-    box = np.full((2 * count + 1, 6), np.inf)
-    box[:, 3:] = -np.inf
-    for leaf in range(count):
-        inside = point[leaves[leaf] : leaves[leaf + 1]]
-        if len(inside):
-            box[count + leaf] = [*inside.min(axis=0), *inside.max(axis=0)]
-    for node in range(count - 1, 0, -1):
-        below = box[2 * node : 2 * node + 2]
-        box[node] = [*below[:, :3].min(axis=0), *below[:, 3:].max(axis=0)]
-    return box
+def joined(numbers: Sequence[npt.NDArray[np.integer]], counts: Sequence[int]) -> npt.NDArray[np.int64]:
+    """Join numbers of things of each set, so that they count the things of all sets."""
+    starts = np.cumsum([0, *counts[:-1]])
+    return np.concatenate([own + start for own, start in zip(numbers, starts, strict=True)])

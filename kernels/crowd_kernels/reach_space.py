@@ -1,7 +1,8 @@
 """Look-up of reach examples: the nearest pseudo-examples of a hand position, and the examples they blend.
 
-A space holds several sets (hand, standing or seated). The points of a set are in the leaves of a balanced
-k-d tree: node n has the children 2 n and 2 n + 1, and all leaves are equally deep.
+A space holds several sets (hand, standing or seated). The space around the points of a set is divided into
+cubes, coarse ones where few points come into question and finer ones where there are many. Each cube lists
+all points that are among the four nearest of any place inside, so that a look-up is one scan without search.
 """
 
 import math
@@ -20,21 +21,32 @@ MOST_SAMPLES = 12
 """Most examples of a look-up: three of the four nearest have a weight."""
 EXACT = 1e-6
 """Distance at which a point takes all the weight, m."""
-FAR = 1e30
-LEAF_POINTS = 16
-"""Most points in a leaf."""
-STACK = 8
-"""Place of the open nodes in the scratch; before it stand the nearest points."""
-LEAF = 32
-"""Place of the distances within a leaf."""
-SCRATCH = LEAF + LEAF_POINTS
+FAR = math.inf
+"""Key of no point; its lowest bits are 0, the first place in a list."""
+COARSEST = 0.2
+"""Edge of the coarsest cubes, m."""
+HALVINGS = 2
+"""How often a cube may be halved in all directions."""
+DIVISIONS = 1 << HALVINGS
+"""Finest cubes along the edge of a coarsest one."""
+PLACE_BITS = 0xFFFF
+"""Bits of a squared distance that give way to a place in a list; the others are exact to 2e-11."""
+LANES = 16
+"""Columns in which squared distances are sorted, each by itself."""
+BLOCK = 2 * LANES
+"""Points that are measured before they are sorted in."""
+MEASURED = NEAREST * LANES
+"""Place of new squared distances in the scratch; before it stand the smallest four of each column."""
+DISTANCE = MEASURED + BLOCK
+"""Place of the distances of the nearest points."""
+SCRATCH = DISTANCE + NEAREST
 
 
 class ReachArrays(NamedTuple):
     """Sets of pseudo-examples as the kernel reads them; P points of all sets one after the other."""
 
     point: npt.NDArray[np.float64]
-    """(3, P) Hand position at the apex, m."""
+    """(P, 4) Hand position at the apex, m, and 0, so that no point lies across cache lines."""
     clip: npt.NDArray[np.int32]
     """(P, 4) Examples that are blended, numbered over all sets."""
     weight: npt.NDArray[np.float64]
@@ -43,22 +55,82 @@ class ReachArrays(NamedTuple):
     """(S, 3) Lowest corner of the space in which places are looked up, m."""
     high: npt.NDArray[np.float64]
     """(S, 3) Highest corner, m."""
-    first_node: npt.NDArray[np.int32]
-    """(S,) Row of `box` before the root of each set's tree."""
-    leaf_count: npt.NDArray[np.int32]
-    """(S,) Leaves of each tree, a power of two."""
-    box: npt.NDArray[np.float64]
-    """(nodes, 6) Lowest and highest coordinates of the points below each node, m."""
-    leaf_start: npt.NDArray[np.int32]
-    """(nodes + 1,) First point of a leaf; only rows of leaves are used, and the row after the last one."""
+    along: npt.NDArray[np.int32]
+    """(S, 3) Coarsest cubes along each axis."""
+    first_cube: npt.NDArray[np.int32]
+    """(S,) Row of `cube` of each set's first coarsest cube."""
+    cube: npt.NDArray[np.int32]
+    """(C, 2) Coarsest cubes, x innermost: the first list, and by how many bits the place among all finest
+    cubes inside, in Morton order, is shifted to the right to get the place among those that have a list."""
+    start: npt.NDArray[np.int32]
+    """(L + 1,) First candidate of each list; at least one, or four where the set has so many."""
+    candidate: npt.NDArray[np.unsignedinteger[Any]]
+    """(N + 32,) Points of all lists, 16 bits each where these suffice; the last ones are spare."""
 
 
 @inlined_kernel
-def box_square(box: Any, node: int, x: float, y: float, z: float) -> float:
-    """Find the square of the distance from a place to the box of a node."""
-    dx = max(max(box[node, 0] - x, x - box[node, 3]), 0.0)
-    dy = max(max(box[node, 1] - y, y - box[node, 4]), 0.0)
-    dz = max(max(box[node, 2] - z, z - box[node, 5]), 0.0)
+def list_around(arrays: ReachArrays, part: int, x: float, y: float, z: float) -> int:
+    """Find the list of candidates of the cube around a place within the space of a set."""
+    finest = DIVISIONS / COARSEST
+    nx, ny, nz = int(arrays.along[part, 0]), int(arrays.along[part, 1]), int(arrays.along[part, 2])
+    i = min(max(int((x - arrays.low[part, 0]) * finest), 0), DIVISIONS * nx - 1)
+    j = min(max(int((y - arrays.low[part, 1]) * finest), 0), DIVISIONS * ny - 1)
+    k = min(max(int((z - arrays.low[part, 2]) * finest), 0), DIVISIONS * nz - 1)
+    cube = arrays.first_cube[part] + ((k >> HALVINGS) * ny + (j >> HALVINGS)) * nx + (i >> HALVINGS)
+    inside = 0
+    for bit in range(HALVINGS):
+        octant = (i >> bit & 1) | (j >> bit & 1) << 1 | (k >> bit & 1) << 2
+        inside |= octant << 3 * bit
+    return int(arrays.cube[cube, 0] + (inside >> arrays.cube[cube, 1]))
+
+
+@inlined_kernel
+def sort_in(keys: Any) -> None:
+    """Sort a block of new keys into the four smallest of each column.
+
+    Parameters
+    ----------
+    keys : (>= 96,) float64
+        In and out: four rows of 16 columns, smallest first, then two rows of new keys, any order.
+
+    Notes
+    -----
+    Of two sorted lists, the smaller ones of each key and its counterpart from the other end are the smallest;
+    they first fall, then rise, or the other way round, and two rounds of comparisons sort them.
+
+    **Source:** Batcher, "Sorting networks and their applications", 1968.
+    """
+    for lane in range(LANES):
+        one, other = keys[MEASURED + lane], keys[MEASURED + LANES + lane]
+        a = keys[lane]
+        b = keys[LANES + lane]
+        c = min(keys[2 * LANES + lane], max(one, other))
+        d = min(keys[3 * LANES + lane], min(one, other))
+        a, c = min(a, c), max(a, c)
+        b, d = min(b, d), max(b, d)
+        keys[lane], keys[LANES + lane] = min(a, b), max(a, b)
+        keys[2 * LANES + lane], keys[3 * LANES + lane] = min(c, d), max(c, d)
+
+
+@inlined_kernel
+def fold_columns(keys: Any, width: int) -> None:
+    """Merge each of the first columns with the one so many columns on; notes as `sort_in`."""
+    for lane in range(width):
+        other = lane + width
+        a = min(keys[lane], keys[3 * LANES + other])
+        b = min(keys[LANES + lane], keys[2 * LANES + other])
+        c = min(keys[2 * LANES + lane], keys[LANES + other])
+        d = min(keys[3 * LANES + lane], keys[other])
+        a, c = min(a, c), max(a, c)
+        b, d = min(b, d), max(b, d)
+        keys[lane], keys[LANES + lane] = min(a, b), max(a, b)
+        keys[2 * LANES + lane], keys[3 * LANES + lane] = min(c, d), max(c, d)
+
+
+@inlined_kernel
+def square_to(point: Any, x: float, y: float, z: float) -> float:
+    """Find the square of the distance from a place to a point (4,)."""
+    dx, dy, dz = point[0] - x, point[1] - y, point[2] - z
     return float(dx * dx + dy * dy + dz * dz)
 
 
@@ -71,6 +143,7 @@ def nearest_points(
     z: float,
     out_point: Any,
     out_distance: Any,
+    keys: Any,
 ) -> int:
     """Find the four points nearest to a place, nearest first.
 
@@ -80,11 +153,13 @@ def nearest_points(
     part : int
         Set.
     x, y, z : float
-        Place, m.
-    out_point : (48,) int32
-        Written: the points in the first four; the rest is scratch.
-    out_distance : (48,) float64
-        Written: their distances, m; the rest is scratch.
+        Place within the space of the set, m.
+    out_point : (>= 4,) int32
+        Written: the points.
+    out_distance : (>= 4,) float64
+        Written: their distances, m.
+    keys : (96,) float64
+        Scratch.
 
     Returns
     -------
@@ -93,61 +168,36 @@ def nearest_points(
 
     Notes
     -----
-    **Source:** Friedman, Bentley, Finkel, "An algorithm for finding best matches in logarithmic expected
-    time", 1977.
-    **Differs from the source:** nodes have tight boxes, which also prune well for places outside.
+    A search in a tree takes most of its time for mispredicted branches, as each is as likely as the other.
+    Here all candidates are measured, and the smallest are sorted out by minima and maxima of numbers that
+    hold the squared distance in the high bits and the place in the list in the low ones.
     """
-    root = arrays.first_node[part]
-    first_leaf = arrays.leaf_count[part]
-    d0 = d1 = d2 = d3 = FAR
-    p0 = p1 = p2 = p3 = -1
-    count = 0
-    out_point[STACK] = 1
-    out_distance[STACK] = 0.0
-    top = STACK + 1
-    while top > STACK:
-        top -= 1
-        node = int(out_point[top])
-        if out_distance[top] >= d3:
-            continue
-        while node < first_leaf:
-            node = 2 * node
-            near = box_square(arrays.box, root + node, x, y, z)
-            far = box_square(arrays.box, root + node + 1, x, y, z)
-            other = node + 1
-            if far < near:
-                near, far = far, near
-                node, other = other, node
-            if far < d3:
-                out_point[top] = other
-                out_distance[top] = far
-                top += 1
-        first = arrays.leaf_start[root + node]
-        inside = arrays.leaf_start[root + node + 1] - first
-        count += inside
-        for i in range(inside):
-            dx = arrays.point[0, first + i] - x
-            dy = arrays.point[1, first + i] - y
-            dz = arrays.point[2, first + i] - z
-            out_distance[LEAF + i] = dx * dx + dy * dy + dz * dz
-        for i in range(inside):
-            d = out_distance[LEAF + i]
-            if d < d3:
-                p = first + i
-                if d < d1:
-                    d3, p3, d2, p2 = d2, p2, d1, p1
-                    if d < d0:
-                        d1, p1, d0, p0 = d0, p0, d, p
-                    else:
-                        d1, p1 = d, p
-                elif d < d2:
-                    d3, p3, d2, p2 = d2, p2, d, p
-                else:
-                    d3, p3 = d, p
-    out_point[0], out_point[1], out_point[2], out_point[3] = p0, p1, p2, p3
-    out_distance[0], out_distance[1] = math.sqrt(d0), math.sqrt(d1)
-    out_distance[2], out_distance[3] = math.sqrt(d2), math.sqrt(d3)
-    return min(count, NEAREST)
+    entry = list_around(arrays, part, x, y, z)
+    first = int(arrays.start[entry])
+    count = int(arrays.start[entry + 1]) - first
+    for key in range(MEASURED):
+        keys[key] = FAR
+    begin = 0
+    while begin < count:
+        block = arrays.candidate[first + begin : first + begin + BLOCK]
+        for i in range(BLOCK):
+            keys[MEASURED + i] = FAR
+        for i in range(min(count - begin, BLOCK)):
+            square = np.float64(square_to(arrays.point[block[i]], x, y, z))
+            keys[MEASURED + i] = np.int64(square.view(np.int64) & ~PLACE_BITS | begin + i).view(np.float64)
+        sort_in(keys)
+        begin += BLOCK
+    fold_columns(keys, 8)
+    fold_columns(keys, 4)
+    fold_columns(keys, 2)
+    fold_columns(keys, 1)
+    found = min(count, NEAREST)
+    for n in range(found):
+        place = np.float64(keys[n * LANES]).view(np.int64) & PLACE_BITS
+        point = arrays.candidate[first + place]
+        out_point[n] = point
+        out_distance[n] = math.sqrt(square_to(arrays.point[point], x, y, z))
+    return found
 
 
 @inlined_kernel
@@ -158,7 +208,7 @@ def find_examples(
     y: float,
     z: float,
     near: Any,
-    distance: Any,
+    real: Any,
     out_clip: Any,
     out_weight: Any,
 ) -> int:
@@ -171,9 +221,9 @@ def find_examples(
         Set.
     x, y, z : float
         Hand position at the library's size, m.
-    near : (48,) int32
+    near : (>= 4,) int32
         Scratch.
-    distance : (48,) float64
+    real : (100,) float64
         Scratch.
     out_clip : (>= 12,) int32
         Written: examples, each once.
@@ -188,7 +238,8 @@ def find_examples(
     x = min(max(x, arrays.low[part, 0]), arrays.high[part, 0])
     y = min(max(y, arrays.low[part, 1]), arrays.high[part, 1])
     z = min(max(z, arrays.low[part, 2]), arrays.high[part, 2])
-    found = nearest_points(arrays, part, x, y, z, near, distance)
+    distance = real[DISTANCE:SCRATCH]
+    found = nearest_points(arrays, part, x, y, z, near, distance, real)
     least = 1.0 / max(distance[found - 1], EXACT) if found == NEAREST else 0.0
     total = 0.0
     for n in range(found):
@@ -223,7 +274,7 @@ def find_examples_crowd(
     part: Any,
     position: Any,
     near: Any,
-    distance: Any,
+    real: Any,
     out_clip: Any,
     out_weight: Any,
     out_count: Any,
@@ -237,9 +288,9 @@ def find_examples_crowd(
         Set of each position, 0 to S - 1.
     position : (N, 3) float64
         Hands at the library's size, m.
-    near : (32, 48) int32
+    near : (32, >= 4) int32
         Scratch of each chunk.
-    distance : (32, 48) float64
+    real : (32, 100) float64
         Scratch of each chunk.
     out_clip : (N, 12) int32
         Examples.
@@ -268,7 +319,7 @@ def find_examples_crowd(
                 position[item, 1],
                 position[item, 2],
                 near[chunk],
-                distance[chunk],
+                real[chunk],
                 out_clip[item],
                 out_weight[item],
             )

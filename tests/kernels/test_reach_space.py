@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crowd.blending.reach_space import PseudoExamples, pack
-from crowd_kernels.reach_space import CHUNKS, MOST_SAMPLES, SCRATCH, find_examples_crowd
+from crowd_kernels.reach_space import CHUNKS, MOST_SAMPLES, NEAREST, SCRATCH, find_examples_crowd
 from tests.oracles import reach_space as oracle
 
 
@@ -27,14 +27,14 @@ def find(part, position, build=find_examples_crowd):
     count = len(position)
     clip, weight = np.full((count, MOST_SAMPLES), -7, np.int32), np.full((count, MOST_SAMPLES), -7.0)
     number = np.zeros(count, np.int32)
-    scratch = np.zeros((CHUNKS, SCRATCH), np.int32), np.zeros((CHUNKS, SCRATCH))
+    scratch = np.zeros((CHUNKS, NEAREST), np.int32), np.zeros((CHUNKS, SCRATCH))
     build(ARRAYS, np.full(count, part, np.int32), position, *scratch, clip, weight, number)
     return [dict(zip(clip[i, :n].tolist(), weight[i, :n], strict=True)) for i, n in enumerate(number)]
 
 
 @pytest.mark.parametrize("part", [0, 1, 2])
 def test_matches_oracle_inside_and_outside(part, rng):
-    positions = np.concatenate([rng.random((60, 3)), rng.normal(0.5, 0.8, (60, 3)).clip(-0.9, 1.9)])
+    positions = np.concatenate([rng.random((500, 3)), rng.normal(0.5, 0.8, (500, 3)).clip(-0.9, 1.9)])
     # Places farther off are brought in before they are looked up.
     positions = positions.clip(ARRAYS.low[part], ARRAYS.high[part])
     chosen = SETS[part]

@@ -16,3 +16,11 @@ def find_examples(point, clip, weight, position):
             if part * own > 0:
                 result[int(number)] = result.get(int(number), 0.0) + part * own
     return result
+
+
+def candidates(point, centre, half):
+    """Points that are not farther than four others at all places of a cube, by comparing all pairs."""
+    square = ((point - centre) ** 2).sum(axis=1)
+    apart = np.abs(point[:, None] - point[None, :]).sum(axis=2)
+    nearer = square[:, None] - square[None, :] > 2.0 * half * apart + 1e-12
+    return np.flatnonzero(nearer.sum(axis=1) < 4).tolist()
