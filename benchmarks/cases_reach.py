@@ -13,7 +13,7 @@ from crowd.blending.reach_space import ReachSpace
 from crowd.controllers.controller import Step
 from crowd.controllers.reach import built_in_reach_space
 from crowd_kernels import _jit
-from crowd_kernels.reach_space import CHUNKS, MOST_SAMPLES, NEAREST, SCRATCH, find_examples_crowd
+from crowd_kernels.reach_space import MOST_SAMPLES, NEAREST, find_examples_crowd
 
 ROUNDS = 16
 """Different places in turn, so that the branch predictor cannot learn them."""
@@ -27,7 +27,7 @@ class Hands:
     tree: cKDTree
     part: npt.NDArray[np.int32]
     position: npt.NDArray[np.float64]
-    near: npt.NDArray[np.int32]
+    number: npt.NDArray[np.int32]
     real: npt.NDArray[np.float64]
     clip: npt.NDArray[np.int32]
     weight: npt.NDArray[np.float64]
@@ -50,8 +50,7 @@ def set_up(size: int, rng: np.random.Generator) -> Hands:
         cKDTree(point),
         np.zeros(size, np.int32),
         point[rng.integers(0, len(point), (ROUNDS, size))] + rng.normal(0.0, 0.02, (ROUNDS, size, 3)),
-        np.zeros((CHUNKS, NEAREST), np.int32),
-        np.zeros((CHUNKS, SCRATCH)),
+        *space.scratch(),
         np.zeros((size, MOST_SAMPLES), np.int32),
         np.zeros((size, MOST_SAMPLES)),
         np.zeros(size, np.int32),
@@ -64,7 +63,7 @@ def run(hands: Hands) -> None:
         hands.space.arrays,
         hands.part,
         hands.next_places(),
-        hands.near,
+        hands.number,
         hands.real,
         hands.clip,
         hands.weight,

@@ -18,7 +18,7 @@ from crowd.motion.clip import Clip
 from crowd.motion.clip_table import rows, sample_keys
 from crowd.motion.rotation import multiply, rotate
 from crowd.motion.skeleton import Segment, Skeleton
-from crowd_kernels.aligned import aligned_copy
+from crowd_kernels.aligned import aligned_copy, aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.reach_blend import LANES, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
 from crowd_kernels.reach_space import (
@@ -26,7 +26,7 @@ from crowd_kernels.reach_space import (
     BLOCK,
     CHUNKS,
     MOST_SAMPLES,
-    NEAREST,
+    NUMBERS,
     SCRATCH,
     ReachArrays,
     find_examples_crowd,
@@ -166,10 +166,15 @@ class ReachSpace:
         sets = np.ascontiguousarray(np.broadcast_to(np.asarray(part, np.int32), len(points)))
         clip = np.zeros((len(points), MOST_SAMPLES), np.int32)
         weight, count = np.zeros((len(points), MOST_SAMPLES)), np.zeros(len(points), np.int32)
-        near, real = np.zeros((CHUNKS, NEAREST), np.int32), np.zeros((CHUNKS, SCRATCH))
-        find_examples_crowd(self.arrays, sets, points, near, real, clip, weight, count)
+        number, real = self.scratch()
+        find_examples_crowd(self.arrays, sets, points, number, real, clip, weight, count)
         weight[np.arange(MOST_SAMPLES) >= count[:, None]] = 0.0
         return clip, weight
+
+    def scratch(self) -> tuple[IntArray, FloatArray]:
+        """What look-ups of all chunks work in."""
+        size = SCRATCH + len(self.keys.first_key)
+        return aligned_zeros((CHUNKS, NUMBERS), np.int32), aligned_zeros((CHUNKS, size))
 
 
 def group_of(name: str) -> int | None:

@@ -39,7 +39,6 @@ from crowd_kernels.reach_goal import (
     ReachState,
     reach_status_crowd,
 )
-from crowd_kernels.reach_space import MOST_SAMPLES, SCRATCH
 
 REACH_LIMITS = ReachLimits(
     least_time=0.25,
@@ -125,9 +124,7 @@ class Reach:
         self._trees = joint_trees(library.skeleton, EFFECTORS)
         self._tree = self._trees[(1 << len(EFFECTORS)) - 1]
         require_lanes(len(self._tree.joint))
-        capacity, size = len(stature), SCRATCH + MOST_SAMPLES
-        self._number = aligned_zeros((CHUNKS, size), np.int32)
-        self._real = aligned_zeros((CHUNKS, size))
+        capacity = len(stature)
         self._rows = aligned_zeros((CHUNKS, 2 * ROW), np.float32)
         length = scratch_length(len(self._tree.joint), len(EFFECTORS), len(Segment))
         self._solve_scratch = aligned_zeros((CHUNKS, length), np.float32)
@@ -154,6 +151,7 @@ class Reach:
         """Make the space of the examples, which takes seconds; without it the first reach of a run does."""
         if self._space is None:
             self._space = reach_space(self._library)
+            self._number, self._real = self._space.scratch()
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people with hanging arms."""

@@ -200,9 +200,9 @@ def reach_character(
         In and out: pose row.
     pelvis : (3,) float32
         In and out: pelvis at leg scale 1, m.
-    number : (60,) int32
+    number : (20,) int32
         Scratch.
-    real : (60,) float64
+    real : (100 + E,) float64
         Scratch.
     rows : (256,) float32
         Scratch.
@@ -317,10 +317,10 @@ def reach_crowd(
         s.
     state : ReachState
         In and out.
-    number : (32, 60) int32
+    number : (32, 20) int32
         Scratch.
-    real : (32, 60) float64
-        Scratch.
+    real : (32, 100 + E) float64
+        Scratch; 0 from `SCRATCH` on before and after.
     rows : (32, 256) float32
         Scratch.
     pose_rotation : (N, 256) float32

@@ -24,7 +24,7 @@ from crowd_kernels.reach_goal import (
     set_vector,
     vector_of,
 )
-from crowd_kernels.reach_space import SCRATCH, ReachArrays, find_examples
+from crowd_kernels.reach_space import NEAREST, SCRATCH, ReachArrays, weigh_examples
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 LANES = 32
@@ -131,31 +131,21 @@ def look_up(
         Stature over the library's.
     space : ReachArrays
     keys : ReachKeys
-    number : (60,) int32
-        Scratch; examples are written from `SCRATCH` on.
-    real : (60,) float64
-        Scratch; weights likewise.
+    number : (20,) int32
+        Scratch; the examples are written from `NEAREST` on, some of them more than once.
+    real : (100 + E,) float64
+        Scratch; the weights of the examples are added from `SCRATCH` on.
 
     Returns
     -------
     int
-        Number of examples.
+        How many examples are written.
     """
     place = scaled(wrist, 1.0 / size)
     if part == 1:
         rest = (keys.pelvis_rest[2 + arm, 0], keys.pelvis_rest[2 + arm, 1], keys.pelvis_rest[2 + arm, 2])
         place = add(scaled(subtract(wrist, pelvis), 1.0 / size), rest)
-    return find_examples(
-        space,
-        2 * part + arm,
-        place[0],
-        place[1],
-        place[2],
-        number[:SCRATCH],
-        real[:SCRATCH],
-        number[SCRATCH:],
-        real[SCRATCH:],
-    )
+    return weigh_examples(space, 2 * part + arm, place[0], place[1], place[2], number, real, real[SCRATCH:])
 
 
 @inlined_kernel
@@ -190,35 +180,51 @@ def is_looked_up(
 
 
 @inlined_kernel
-def add_wanted(clip: int, weight: float, character: int, arm: int, state: ReachState) -> None:
-    """Add a weight that an example shall have to its slot, or to a free one; without any it is left out.
+def add_wanted(share: float, example: Any, weight: Any, character: int, arm: int, state: ReachState) -> None:
+    """Add the weights that examples shall have to their slots, or to free ones; where none is, they are lost.
 
     Parameters
     ----------
-    clip : int
-    weight : float
+    share : float
+        Factor of the weights.
+    example : (S,) int32
+        Examples, some of them more than once.
+    weight : (E,) float64
+        In and out: weights of all examples; then 0 for these.
     character, arm : int
     state : ReachState
         In and out: `example`, `example_wanted`, `example_count`.
     """
     count = state.example_count[character, arm]
-    free = count
     for slot in range(count):
-        is_used = (
-            state.example_weight[character, arm, slot] != 0.0
-            or state.example_wanted[character, arm, slot] != 0.0
-        )
-        if is_used and state.example[character, arm, slot] == clip:
-            state.example_wanted[character, arm, slot] += weight
-            return
-        if not is_used and slot < free:
-            free = slot
-    if free < SLOTS:
+        clip = state.example[character, arm, slot]
+        if is_slot_used(character, arm, slot, state):
+            state.example_wanted[character, arm, slot] += share * weight[clip]
+            weight[clip] = 0.0
+    free = 0
+    for sample in range(example.shape[0]):
+        clip = example[sample]
+        wanted = share * weight[clip]
+        weight[clip] = 0.0
+        if not wanted > 0.0:
+            continue
+        while free < count and is_slot_used(character, arm, free, state):
+            free += 1
+        if free == SLOTS:
+            continue
         state.example[character, arm, free] = clip
         state.example_weight[character, arm, free] = 0.0
         state.example_weight_rate[character, arm, free] = 0.0
-        state.example_wanted[character, arm, free] = weight
-        state.example_count[character, arm] = max(count, free + 1)
+        state.example_wanted[character, arm, free] = wanted
+        count = max(count, free + 1)
+    state.example_count[character, arm] = count
+
+
+@inlined_kernel
+def is_slot_used(character: int, arm: int, slot: int, state: ReachState) -> bool:
+    """Tell whether a slot holds an example: one that has a weight or shall have one."""
+    has_weight = state.example_weight[character, arm, slot] != 0.0
+    return bool(has_weight or state.example_wanted[character, arm, slot] != 0.0)
 
 
 @inlined_kernel
@@ -256,8 +262,7 @@ def look_up_examples(
         if share <= 0.0:
             continue
         found = look_up(part, arm, wrist, pelvis, size, space, keys, number, real)
-        for sample in range(SCRATCH, SCRATCH + found):
-            add_wanted(number[sample], share * real[sample], character, arm, state)
+        add_wanted(share, number[NEAREST : NEAREST + found], real[SCRATCH:], character, arm, state)
     set_vector(state.looked_up, character, arm, wrist)
     set_vector(state.looked_up_pelvis, character, arm, pelvis)
     state.looked_up_share[character, arm] = upper_share

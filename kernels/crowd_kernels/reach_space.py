@@ -40,6 +40,8 @@ MEASURED = NEAREST * LANES
 DISTANCE = MEASURED + BLOCK
 """Place of the distances of the nearest points."""
 SCRATCH = DISTANCE + NEAREST
+NUMBERS = NEAREST + NEAREST * BLENDED
+"""Length of the scratch for numbers: the nearest points and all that they blend."""
 
 
 class ReachArrays(NamedTuple):
@@ -201,18 +203,17 @@ def nearest_points(
 
 
 @inlined_kernel
-def find_examples(
+def weigh_examples(
     arrays: ReachArrays,
     part: int,
     x: float,
     y: float,
     z: float,
-    near: Any,
+    number: Any,
     real: Any,
-    out_clip: Any,
     out_weight: Any,
 ) -> int:
-    """Find the examples to blend for a hand position.
+    """Find the weights of the examples to blend for a hand position.
 
     Parameters
     ----------
@@ -221,13 +222,69 @@ def find_examples(
         Set.
     x, y, z : float
         Hand position at the library's size, m.
-    near : (>= 4,) int32
+    number : (20,) int32
+        Scratch; the examples are written from `NEAREST` on, some of them more than once.
+    real : (>= 100,) float64
         Scratch.
-    real : (100,) float64
+    out_weight : (E,) float64
+        In and out: to the weights of all examples those of the ones found are added: not negative, sum 1.
+
+    Returns
+    -------
+    int
+        How many examples are written, 4 to 16.
+    """
+    x = min(max(x, arrays.low[part, 0]), arrays.high[part, 0])
+    y = min(max(y, arrays.low[part, 1]), arrays.high[part, 1])
+    z = min(max(z, arrays.low[part, 2]), arrays.high[part, 2])
+    distance = real[DISTANCE:SCRATCH]
+    found = nearest_points(arrays, part, x, y, z, number, distance, real)
+    for n in range(found):
+        distance[n] = 1.0 / max(distance[n], EXACT)
+    least = distance[found - 1] if found == NEAREST else 0.0
+    total = 0.0
+    for n in range(found):
+        total += max(distance[n] - least, 0.0)
+    # The fourth has no weight, but where all are equally far, as from a circle's centre, they share.
+    sharing = min(found, NEAREST - 1) if total > 0.0 else found
+    for n in range(sharing):
+        share = max(distance[n] - least, 0.0) / total if total > 0.0 else 1.0 / found
+        point = number[n]
+        for b in range(BLENDED):
+            clip = arrays.clip[point, b]
+            out_weight[clip] += share * arrays.weight[point, b]
+            number[NEAREST + n * BLENDED + b] = clip
+    return sharing * BLENDED
+
+
+@inlined_kernel
+def find_examples(
+    arrays: ReachArrays,
+    part: int,
+    x: float,
+    y: float,
+    z: float,
+    number: Any,
+    real: Any,
+    out_clip: Any,
+    out_weight: Any,
+) -> int:
+    """Find the examples to blend for a hand position, each once.
+
+    Parameters
+    ----------
+    arrays : ReachArrays
+    part : int
+        Set.
+    x, y, z : float
+        Hand position at the library's size, m.
+    number : (20,) int32
         Scratch.
-    out_clip : (>= 12,) int32
-        Written: examples, each once.
-    out_weight : (>= 12,) float64
+    real : (100 + E,) float64
+        Scratch; 0 from `SCRATCH` on before and after.
+    out_clip : (12,) int32
+        Written: examples; those after the last one have no meaning.
+    out_weight : (12,) float64
         Written: their weights: positive, sum 1.
 
     Returns
@@ -235,36 +292,18 @@ def find_examples(
     int
         Number of examples, 1 to 12.
     """
-    x = min(max(x, arrays.low[part, 0]), arrays.high[part, 0])
-    y = min(max(y, arrays.low[part, 1]), arrays.high[part, 1])
-    z = min(max(z, arrays.low[part, 2]), arrays.high[part, 2])
-    distance = real[DISTANCE:SCRATCH]
-    found = nearest_points(arrays, part, x, y, z, near, distance, real)
-    least = 1.0 / max(distance[found - 1], EXACT) if found == NEAREST else 0.0
-    total = 0.0
-    for n in range(found):
-        total += 1.0 / max(distance[n], EXACT) - least
+    whole = real[SCRATCH:]
+    samples = weigh_examples(arrays, part, x, y, z, number, real, whole)
     count = 0
-    for n in range(found):
-        # Where all are equally far, as from a circle's centre, they share.
-        share = (1.0 / max(distance[n], EXACT) - least) / total if total > 0.0 else 1.0 / found
-        if not share > 0.0:
-            continue
-        for b in range(BLENDED):
-            weight = share * arrays.weight[near[n], b]
-            if not weight > 0.0:
-                continue
-            clip = arrays.clip[near[n], b]
-            place = 0
-            while place < count and out_clip[place] != clip:
-                place += 1
-            if place == count:
-                if count == MOST_SAMPLES:
-                    continue
-                out_clip[count] = clip
-                out_weight[count] = 0.0
-                count += 1
-            out_weight[place] += weight
+    for sample in range(NEAREST, NEAREST + samples):
+        clip = number[sample]
+        weight = whole[clip]
+        whole[clip] = 0.0
+        # What has no weight, or has it no longer, is written over by the next one.
+        if count < MOST_SAMPLES:
+            out_clip[count] = clip
+            out_weight[count] = weight
+        count = min(count + int(weight > 0.0), MOST_SAMPLES)
     return count
 
 
@@ -273,7 +312,7 @@ def find_examples_crowd(
     arrays: ReachArrays,
     part: Any,
     position: Any,
-    near: Any,
+    number: Any,
     real: Any,
     out_clip: Any,
     out_weight: Any,
@@ -288,14 +327,14 @@ def find_examples_crowd(
         Set of each position, 0 to S - 1.
     position : (N, 3) float64
         Hands at the library's size, m.
-    near : (32, >= 4) int32
+    number : (32, 20) int32
         Scratch of each chunk.
-    real : (32, 100) float64
-        Scratch of each chunk.
+    real : (32, 100 + E) float64
+        Scratch of each chunk; 0 from `SCRATCH` on before and after.
     out_clip : (N, 12) int32
         Examples.
     out_weight : (N, 12) float64
-        Their weights; those after the last example are not written.
+        Their weights; those after the last example have no meaning.
     out_count : (N,) int32
         Number of examples.
 
@@ -318,7 +357,7 @@ def find_examples_crowd(
                 position[item, 0],
                 position[item, 1],
                 position[item, 2],
-                near[chunk],
+                number[chunk],
                 real[chunk],
                 out_clip[item],
                 out_weight[item],

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crowd.blending.reach_space import PseudoExamples, pack
-from crowd_kernels.reach_space import CHUNKS, MOST_SAMPLES, NEAREST, SCRATCH, find_examples_crowd
+from crowd_kernels.reach_space import CHUNKS, MOST_SAMPLES, NUMBERS, SCRATCH, find_examples_crowd
 from tests.oracles import reach_space as oracle
 
 
@@ -27,7 +27,7 @@ def find(part, position, build=find_examples_crowd):
     count = len(position)
     clip, weight = np.full((count, MOST_SAMPLES), -7, np.int32), np.full((count, MOST_SAMPLES), -7.0)
     number = np.zeros(count, np.int32)
-    scratch = np.zeros((CHUNKS, NEAREST), np.int32), np.zeros((CHUNKS, SCRATCH))
+    scratch = np.zeros((CHUNKS, NUMBERS), np.int32), np.zeros((CHUNKS, SCRATCH + 18))
     build(ARRAYS, np.full(count, part, np.int32), position, *scratch, clip, weight, number)
     return [dict(zip(clip[i, :n].tolist(), weight[i, :n], strict=True)) for i, n in enumerate(number)]
 
