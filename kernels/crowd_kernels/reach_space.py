@@ -143,9 +143,9 @@ def nearest_points(
     x: float,
     y: float,
     z: float,
+    keys: Any,
     out_point: Any,
     out_distance: Any,
-    keys: Any,
 ) -> int:
     """Find the four points nearest to a place, nearest first.
 
@@ -156,12 +156,12 @@ def nearest_points(
         Set.
     x, y, z : float
         Place within the space of the set, m.
+    keys : (>= 96,) float64
+        Scratch.
     out_point : (>= 4,) int32
         Written: the points.
     out_distance : (>= 4,) float64
         Written: their distances, m.
-    keys : (96,) float64
-        Scratch.
 
     Returns
     -------
@@ -238,7 +238,7 @@ def weigh_examples(
     y = min(max(y, arrays.low[part, 1]), arrays.high[part, 1])
     z = min(max(z, arrays.low[part, 2]), arrays.high[part, 2])
     distance = real[DISTANCE:SCRATCH]
-    found = nearest_points(arrays, part, x, y, z, number, distance, real)
+    found = nearest_points(arrays, part, x, y, z, real, number, distance)
     for n in range(found):
         distance[n] = 1.0 / max(distance[n], EXACT)
     least = distance[found - 1] if found == NEAREST else 0.0
