@@ -234,6 +234,12 @@ class State:
     """rad/s^2. (character, 2, 3)"""
     reach_rotation_share: FloatArray = _array(2)
     """How far the rotation of the goal counts, 0 to 1. (character, 2)"""
+    reach_missing_place: FloatArray = _array(2, 3)
+    """Way from the point of the hand to where it was wanted in the last step, root frame, m.
+    (character, 2, 3)"""
+    reach_missing_turn: FloatArray = _array(2, 3)
+    """Rotation vector from the hand to the rotation wanted in the last step, root frame, rad.
+    (character, 2, 3)"""
     reach_example: IntArray = _array(2, SLOTS, dtype=np.int32)
     """Examples that are blended; those of weight 0 mean nothing. (character, 2, 24)"""
     reach_example_weight: FloatArray = _array(2, SLOTS)

@@ -23,6 +23,8 @@ GOING, COMING = 85, 110
 """Frames in which every hand has come to its target, and back to rest."""
 TILT = math.radians(20.0)
 """Largest turn of a rotation that is asked for against that of the examples, rad."""
+TWIST = math.radians(140.0)
+"""Turn of a rotation that hardly anybody can have."""
 FAR = 0.5
 """Targets out of reach are farther than this from every blend, m."""
 WATCHED = 10
@@ -155,6 +157,12 @@ def random_targets(reachers: Reachers, hand: int, rng: np.random.Generator, is_f
     return np.asarray(found[: len(reachers.rows)] * reachers.size[:, None])
 
 
+def random_turns(count: int, rng: np.random.Generator) -> FloatArray:
+    """Draw rotation vectors (N, 3) of 1 rad about any axis."""
+    axis = rng.normal(size=(count, 3))
+    return np.asarray(axis / np.linalg.norm(axis, axis=1, keepdims=True))
+
+
 def angular_motion(rotation: FloatArray, dt: float) -> tuple[float, float]:
     """Largest angular speed and acceleration of any joint over frames (F, N, J, 4)."""
     speed = to_vector(multiply(conjugate(rotation[:-1]), rotation[1:])) / dt
@@ -216,19 +224,31 @@ def measure(targets: int, far: int, seed: int = 0) -> list[ReachQuality]:
     most = example_acceleration(clips, reachers.space.keys.joint)
     results = []
     for hand, side in enumerate(SIDES):
-        batches: dict[str, list[Batch]] = {"position": [], "position and rotation": [], "out of reach": []}
+        batches: dict[str, list[Batch]] = {
+            "position": [],
+            "position and rotation": [],
+            "out of reach": [],
+            "rotation out of reach": [],
+            "both out of reach": [],
+        }
         for _ in range(math.ceil(targets / people)):
             target = random_targets(reachers, hand, rng, is_far=False)
             first = run_batch(reachers, hand, target, None)
             batches["position"].append((target, None, *first))
-            axis = rng.normal(size=(people, 3))
-            axis *= TILT * rng.random((people, 1)) / np.linalg.norm(axis, axis=1, keepdims=True)
-            wanted = multiply(from_vector(axis), first[1])
+            tilt = random_turns(people, rng) * rng.random((people, 1))
+            wanted = multiply(from_vector(TILT * tilt), first[1])
             second = run_batch(reachers, hand, target, wanted)
             batches["position and rotation"].append((target, wanted, *second))
         for _ in range(math.ceil(far / people)):
             target = random_targets(reachers, hand, rng, is_far=True)
-            batches["out of reach"].append((target, None, *run_batch(reachers, hand, target, None)))
+            first = run_batch(reachers, hand, target, None)
+            batches["out of reach"].append((target, None, *first))
+            wanted = multiply(from_vector(TWIST * random_turns(people, rng)), first[1])
+            second = run_batch(reachers, hand, target, wanted)
+            batches["both out of reach"].append((target, wanted, *second))
+            target = random_targets(reachers, hand, rng, is_far=False)
+            third = run_batch(reachers, hand, target, wanted)
+            batches["rotation out of reach"].append((target, wanted, *third))
         results += [judge(f"{side} hand, {name}", part, most) for name, part in batches.items() if part]
     return results
 

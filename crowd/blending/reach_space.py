@@ -215,6 +215,7 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
         np.array(joints, np.int32),
         np.array([groups[joint] for joint in joints], np.int32),
         np.array([[joints.index(joint) for joint in chain] for chain in chains], np.int32),
+        np.searchsorted(np.unique(chains), chains).astype(np.int32),
         np.ascontiguousarray(skeleton.offset[chains]),
         np.ascontiguousarray(skeleton.segment[chains], np.int32),
         int(Segment.LEG),

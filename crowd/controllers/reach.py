@@ -39,6 +39,7 @@ from crowd_kernels.reach_goal import (
     ReachState,
     reach_status_crowd,
 )
+from crowd_kernels.reach_missing import find_missing_crowd
 
 REACH_LIMITS = ReachLimits(
     least_time=0.25,
@@ -52,9 +53,12 @@ REACH_LIMITS = ReachLimits(
     lead=0.8,
     rotation_rate=3.0,
     farthest=0.13,
+    missing_rate=8.0,
     example_rate=22.0,
 )
-SOLVE = SETTINGS._replace(reach=1e3, damping=0.016, error_damping=0.4, pull_fade=1.0, place_first=0)
+SOLVE = SETTINGS._replace(
+    reach=1e3, damping=0.016, error_damping=0.4, turn_error_damping=6.0, pull_fade=1.0, place_first=0
+)
 EFFECTORS = ("right_hand", "left_hand")
 FEWEST_EXAMPLES = 8
 """A library with fewer reaches of a hand takes the built-in ones."""
@@ -82,13 +86,14 @@ class ReachSettings:
     """m. Walls are looked for again when a target has moved as far as this."""
 
     def solve_for(self, dt: float) -> SolveSettings:
-        """Settings of the solves in steps of `dt` s: motions are the same with any step."""
+        """Settings of the solves in steps of `dt` s, for like motions with any step."""
         iterations = math.ceil(dt / self.iteration_time - 1e-9)
         span = dt / iterations
         stiffness = self.iteration_time / span
         return self.solve._replace(
             damping=self.solve.damping * math.sqrt(stiffness),
             error_damping=self.solve.error_damping * stiffness,
+            turn_error_damping=self.solve.turn_error_damping * stiffness,
             pull=1.0 - math.exp(-self.fade_rate * span),
             approach=1.0 - math.exp(-self.limit_rate * span),
             least_iterations=iterations,
@@ -132,6 +137,7 @@ class Reach:
         self._task = aligned_zeros((capacity, 2), np.uint8)
         self._point = aligned_zeros((capacity, 2, 3), np.float32)
         self._target = aligned_zeros((capacity, 2, 3), np.float32)
+        self._kept = aligned_zeros((capacity, 2), np.float32)
         self._target_rotation = aligned_zeros((capacity, 2, 4), np.float32)
         self._status = aligned_zeros((capacity, 2), np.uint8)
         self._distance = aligned_zeros((capacity, 2), np.float32)
@@ -300,14 +306,29 @@ class Reach:
             self._number,
             self._real,
             self._rows,
+            state.reach_correction,
             state.pose_rotation,
             state.pose_pelvis,
             self._task,
             self._target,
             self._target_rotation,
+            self._kept,
         )
         blended = time.perf_counter()
         self._solve(state, reaching, step.dt)
+        find_missing_crowd(
+            self.space.keys,
+            self._segment_scale,
+            self._task,
+            self._target,
+            self._target_rotation,
+            reaching,
+            state.pose_rotation,
+            state.pose_pelvis,
+            self._distance,
+            parts,
+            self._angle,
+        )
         self.part_seconds["blending"] += blended - begin
         self.part_seconds["inverse kinematics"] += time.perf_counter() - blended
         self._report(state, reaching, step.dt, parts)
@@ -320,7 +341,13 @@ class Reach:
         """Bring hands to their targets, from the blended poses turned as the last solutions were."""
         np.copyto(self._point, state.reach_point_hand, casting="same_kind")
         start_solves(
-            self._tree, self._task, state.reach_correction, state.pose_rotation, reaching, self._solution
+            self._tree,
+            self._task,
+            self._kept,
+            state.reach_correction,
+            state.pose_rotation,
+            reaching,
+            self._solution,
         )
         settings = self.settings.solve_for(dt)
         hands = (self._task[reaching] != 0) @ (1 << np.arange(len(EFFECTORS)))

@@ -92,7 +92,7 @@ ONE: Any = np.float32(1.0)
 ZERO: Any = np.float32(0.0)
 FAR: Any = np.float32(1e30)
 LEAST_LENGTH = 0.5
-CONTROL_ROWS = 10
+CONTROL_ROWS = 11
 
 
 class TreeArrays(NamedTuple):
@@ -150,6 +150,9 @@ class SolveSettings(NamedTuple):
     error_damping: float
     """Its product with the position step is added to the square of the damping, m. An arm that is stretched
     towards a target beyond it swings to and fro where this is smaller than its forearm."""
+    turn_error_damping: float
+    """Its product with the turn is added to the damping of rotations, 1/rad. Joints at their limits swing to
+    and fro below a rotation that they cannot have where this is small."""
     pull: float
     """Share of the way to the reference pose that the first iteration takes."""
     pull_fade: float
@@ -186,6 +189,7 @@ class SolveSettings(NamedTuple):
 SETTINGS = SolveSettings(
     damping=0.02,
     error_damping=0.2,
+    turn_error_damping=0.0,
     pull=0.1,
     pull_fade=0.8,
     pull_step=0.087,
@@ -333,8 +337,8 @@ def solve_system(count: int, parts: int, damping: Any, system: Any, out_push: An
         Rows of blocks.
     parts : int
         Rows of blocks of an effector: 1 position, 2 position and rotation.
-    damping : (16,) float32
-        Added to the diagonal.
+    damping : (32,) float32
+        Added to the diagonal, of positions and of rotations.
     system : (count * (count + 1) / 2, 144) float32
         Blocks of the lower triangle, replaced by the factor.
     out_push : (E, PUSH) float32
@@ -354,7 +358,8 @@ def solve_system(count: int, parts: int, damping: Any, system: Any, out_push: An
             subtract_block(
                 system[block_of(row, inner)], system[block_of(row, inner)], system[block_of(row, row)]
             )
-        factor_block(damping, system[block_of(row, row)])
+        part = row % parts * LANES
+        factor_block(damping[part : part + LANES], system[block_of(row, row)])
     for row in range(count):
         for column in range(row):
             subtract_lower(
@@ -621,18 +626,18 @@ def solve_block(
         Scratch.
     push : (E, PUSH) float32
         Scratch.
-    control : (5 * 16,) float32
+    control : (6 * 16,) float32
         Scratch.
     out_iterations : (32,) float32
         Iterations made, and iterations without progress.
     """
     count = tree.effector.shape[0]
-    totals = control[: 3 * LANES]
+    totals = control[: 4 * LANES]
     error = control[:LANES]
     missing = control[LANES : 2 * LANES]
-    damping = control[2 * LANES : 3 * LANES]
-    best = control[3 * LANES : 4 * LANES]
-    running = control[4 * LANES : 5 * LANES]
+    damping = control[2 * LANES : 4 * LANES]
+    best = control[4 * LANES : 5 * LANES]
+    running = control[5 * LANES : 6 * LANES]
     iterations = out_iterations[:LANES]
     stalled = out_iterations[LANES : 2 * LANES]
     root_weight = np.float32(tree.root_weight)
@@ -649,6 +654,7 @@ def solve_block(
             error[lane] = ZERO
             missing[lane] = ZERO
             damping[lane] = np.float32(settings.damping * settings.damping)
+            damping[LANES + lane] = damping[lane]
         waiting = np.float32(settings.waiting_distance) if iteration < settings.place_first else FAR
         for e in range(count):
             effector_row(
@@ -658,7 +664,7 @@ def solve_block(
                 (np.float32(settings.place_step), np.float32(settings.turn_step)),
                 waiting,
                 (np.float32(settings.distance_tolerance), np.float32(settings.angle_tolerance)),
-                np.float32(settings.error_damping),
+                (np.float32(settings.error_damping), np.float32(settings.turn_error_damping)),
                 effectors[e],
                 totals,
             )
@@ -902,9 +908,9 @@ def solve_chunk(
     system = scratch[system_begin:push_begin].reshape(effector_count * (2 * effector_count + 1), BLOCK)
     push = scratch[push_begin:scale_begin].reshape(effector_count, PUSH)
     scale = scratch[scale_begin:control_begin]
-    control = scratch[control_begin : control_begin + 5 * LANES]
-    root_reference = scratch[control_begin + 5 * LANES : control_begin + 8 * LANES]
-    iterations = scratch[control_begin + 8 * LANES : control_begin + 10 * LANES]
+    control = scratch[control_begin : control_begin + 6 * LANES]
+    root_reference = scratch[control_begin + 6 * LANES : control_begin + 9 * LANES]
+    iterations = scratch[control_begin + 9 * LANES : control_begin + 11 * LANES]
     for block in range(begin, end):
         first = block * LANES
         gather_joints(

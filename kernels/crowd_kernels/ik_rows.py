@@ -351,13 +351,13 @@ def effector_row(
         Distance beyond which the rotation waits for the position, m.
     tolerances : tuple of float32
         What counts as reached, m and rad.
-    damping : float32
-        Length whose product with the position step is added to the damping, m.
+    damping : tuple of float32
+        Factors of the position step and of the turn in the damping, m and 1/rad.
     row : (EFFECTOR_ROW,) float32
         The effector: tip, miss, distance, angle, `IS_FAR` and `TURNS` are written.
-    out_totals : (48,) float32
+    out_totals : (64,) float32
         Sums over effectors, in and out: error (distances and 0.3 m per rad of the angles), number of
-        effectors that are not at their targets, damping in m^2.
+        effectors that are not at their targets, damping of positions in m^2 and of rotations.
     """
     for lane in range(LANES):
         frame = quaternion_at(joint, FRAME, lane)
@@ -382,7 +382,7 @@ def effector_row(
         row[DISTANCE + lane] = distance
         share = min(ONE, steps[0] / distance)
         put_vector(row, MISS, lane, (miss[0] * share, miss[1] * share, miss[2] * share))
-        out_totals[2 * LANES + lane] += damping * distance * share
+        out_totals[2 * LANES + lane] += damping[0] * distance * share
         turn = multiply(quaternion_at(row, TARGET_FRAME, lane), conjugate(frame))
         square = turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]
         # The angle is twice the arc sine of the vector part.
@@ -392,7 +392,9 @@ def effector_row(
         row[ANGLE + lane] = angle
         turns = row[WANTS_FRAME + lane] * (ONE - wants * (ONE if distance > waiting_distance else ZERO))
         row[TURNS + lane] = turns
-        share = turns * factor * min(ONE, steps[1] / angle)
+        share = turns * min(ONE, steps[1] / angle)
+        out_totals[3 * LANES + lane] += damping[1] * angle * share
+        share *= factor
         put_vector(row, MISS + 3 * LANES, lane, (turn[1] * share, turn[2] * share, turn[3] * share))
         out_totals[lane] += distance + ANGLE_LENGTH * angle
         is_there = (distance < tolerances[0]) & (angle < tolerances[1])

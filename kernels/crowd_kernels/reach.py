@@ -1,5 +1,6 @@
 """Reaching: poses of many characters, and the targets that inverse kinematics takes their hands to."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ from crowd_kernels.quaternion import (
     conjugate,
     from_rotation_vector,
     multiply,
+    normalized,
     rotate,
     rotation_vector,
     slerp,
 )
 from crowd_kernels.reach_blend import (
+    CHAIN,
     LANES,
     ROW,
     ReachKeys,
@@ -26,6 +29,7 @@ from crowd_kernels.reach_blend import (
     sum_examples,
     unit_row,
 )
+from crowd_kernels.reach_correction import LANES as CORRECTED
 from crowd_kernels.reach_goal import (
     APEX,
     END,
@@ -39,6 +43,7 @@ from crowd_kernels.reach_goal import (
     track_target,
     vector_of,
 )
+from crowd_kernels.reach_missing import spare_missing_place, spare_missing_turn
 from crowd_kernels.reach_space import ReachArrays
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
@@ -59,6 +64,90 @@ def shortened(vector: Vector, longest: float) -> Vector:
 
 
 @inlined_kernel
+def carried_hand(
+    keys: ReachKeys, arm: int, scale: Any, pelvis: Vector, pose: Any, correction: Any
+) -> tuple[Vector, Quaternion]:
+    """Find where a hand would be if only the trunk were corrected, as it was in the last step.
+
+    Parameters
+    ----------
+    keys : ReachKeys
+    arm : int
+    scale : (G,) float32
+        Proportions.
+    pelvis : tuple of float
+        Root frame, m.
+    pose : (256,) float32
+        Pose row, blended.
+    correction : (96,) float32
+        Row of `reach_correction`.
+
+    Returns
+    -------
+    tuple of float, tuple of float
+        Position, m, and rotation of the hand, root frame.
+    """
+    place = pelvis
+    turned = (1.0, 0.0, 0.0, 0.0)
+    for k in range(CHAIN):
+        if k > 0:
+            size = float(scale[keys.chain_segment[arm, k]])
+            offset = (
+                size * keys.chain_offset[arm, k, 0],
+                size * keys.chain_offset[arm, k, 1],
+                size * keys.chain_offset[arm, k, 2],
+            )
+            place = add(place, rotate(turned, offset))
+        if keys.chain[0, k] == keys.chain[1, k]:
+            at = keys.chain_place[arm, k]
+            x, y, z = (
+                float(correction[at]),
+                float(correction[CORRECTED + at]),
+                float(correction[2 * CORRECTED + at]),
+            )
+            w = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
+            turned = multiply(turned, (w, x, y, z))
+        joint = keys.joint[keys.chain[arm, k]]
+        local = (
+            float(pose[joint]),
+            float(pose[PADDED_JOINTS + joint]),
+            float(pose[2 * PADDED_JOINTS + joint]),
+            float(pose[3 * PADDED_JOINTS + joint]),
+        )
+        turned = multiply(turned, local)
+    return place, normalized(turned)
+
+
+@inlined_kernel
+def share_of_other(character: int, arm: int, risen: float, limits: ReachLimits, state: ReachState) -> float:
+    """Find how much of a shared trunk's correction a hand leaves to the other one.
+
+    All of it at rest, nothing at the apex, where the hand must be at its goal whatever the trunk does.
+    """
+    if state.stage[character, 1 - arm] == NONE:
+        return 0.0
+    _, other = course_shares(state.course[character, 1 - arm], limits.lead)
+    return (1.0 - risen) * other / (risen + other) if other > 0.0 else 0.0
+
+
+@inlined_kernel
+def kept_share(course: float, advance: float, lead: float) -> float:
+    """Find how much of its last correction a hand keeps: on its way back less in each step, at rest nothing.
+
+    Parameters
+    ----------
+    course : float
+    advance : float
+        How far the course went in this step.
+    lead : float
+        See `ReachLimits`.
+    """
+    _, now = course_shares(course, lead)
+    _, before = course_shares(course - advance, lead)
+    return min(now / before, 1.0) if before > 0.0 else 1.0
+
+
+@inlined_kernel
 def aim_hand(
     character: int,
     arm: int,
@@ -69,12 +158,15 @@ def aim_hand(
     keys: ReachKeys,
     limits: ReachLimits,
     state: ReachState,
+    dt: float,
     row: Any,
     pose: Any,
     pelvis: Any,
+    correction: Any,
     out_task: Any,
     out_target: Any,
     out_target_rotation: Any,
+    out_kept: Any,
 ) -> None:
     """Set where inverse kinematics takes one hand: exactly to the goal at the apex.
 
@@ -94,6 +186,8 @@ def aim_hand(
         Pose row, blended.
     pelvis : (3,) float32
         Pelvis at leg scale 1, m.
+    correction : (96,) float32
+        Last corrections of the character's joints, see `reach_correction`.
 
     Notes
     -----
@@ -107,6 +201,9 @@ def aim_hand(
     course = state.course[character, arm]
     side = course if course <= APEX else END - course
     _, risen = course_shares(course, limits.lead)
+    kept = kept_share(course, state.course_rate[character, arm] * dt, limits.lead)
+    out_kept[character, arm] = kept
+    kept *= math.exp(-limits.missing_rate * dt)
     body = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
     rotation = (
         float(pose[0]),
@@ -118,11 +215,17 @@ def aim_hand(
     point = vector_of(state.point_hand, character, arm)
     goal = goal_of(state, character, arm)
     here = add(hand, rotate(turned, point))
+    left = share_of_other(character, arm, risen, limits, state)
+    if left > 0.0:
+        carried, carried_turn = carried_hand(keys, arm, scale, body, pose, correction)
+        carried = add(carried, rotate(carried_turn, point))
+        here = add(here, scaled(subtract(carried, here), left))
+        turned = slerp(turned, carried_turn, left)
     wanted = quaternion_of(state.rotation, character, arm)
     # Beyond the blends inverse kinematics would find nothing that looks human.
     farthest = limits.farthest + SHARED_TRUNK * other
-    goal = add(here, shortened(subtract(goal, here), farthest)) if course == APEX else goal
-    target = goal
+    nearest = add(here, shortened(subtract(goal, here), farthest))
+    target = nearest
     late = 1.0
     asked = minimum_jerk(state.rotation_share[character, arm])
     out_task[character, arm] = 1
@@ -144,12 +247,14 @@ def aim_hand(
         target = add(here, scaled(miss, risen))
         # A trunk that is shared with the other hand does not do what was foreseen.
         late = minimum_jerk(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * minimum_jerk(min(5.0 * other, 1.0))
-        target = add(target, scaled(subtract(goal, target), late))
+        target = add(target, scaled(subtract(nearest, target), late))
         turn = rotation_vector(multiply(wanted, conjugate(apex_turned)))
         turned = multiply(from_rotation_vector(scaled(turn, risen * asked)), turned)
     if asked > 0.0:
         out_task[character, arm] = 3
         turned = slerp(turned, wanted, late * asked)
+        turned = spare_missing_turn(turned, character, arm, kept, state)
+    target = spare_missing_place(target, character, arm, kept, state)
     for axis in range(3):
         out_target[character, arm, axis] = target[axis]
     for component in range(4):
@@ -175,9 +280,11 @@ def reach_character(
     number: Any,
     real: Any,
     rows: Any,
+    correction: Any,
     out_task: Any,
     out_target: Any,
     out_target_rotation: Any,
+    out_kept: Any,
 ) -> None:
     """Advance both hands of one character, blend its pose, and set the targets of inverse kinematics.
 
@@ -206,6 +313,8 @@ def reach_character(
         Scratch.
     rows : (256,) float32
         Scratch.
+    correction : (96,) float32
+        Last corrections of the character's joints, see `reach_correction`.
 
     Notes
     -----
@@ -259,12 +368,15 @@ def reach_character(
                 keys,
                 limits,
                 state,
+                dt,
                 row,
                 pose,
                 pelvis,
+                correction,
                 out_task,
                 out_target,
                 out_target_rotation,
+                out_kept,
             )
 
 
@@ -285,11 +397,13 @@ def reach_crowd(
     number: Any,
     real: Any,
     rows: Any,
+    correction: Any,
     pose_rotation: Any,
     pose_pelvis: Any,
     out_task: Any,
     out_target: Any,
     out_target_rotation: Any,
+    out_kept: Any,
 ) -> None:
     """Advance the reaches of many characters, blend their poses, and set the targets of inverse kinematics.
 
@@ -323,6 +437,8 @@ def reach_crowd(
         Scratch; 0 from `SCRATCH` on before and after.
     rows : (32, 256) float32
         Scratch.
+    correction : (N, 96) float32
+        Last corrections, see `reach_correction`.
     pose_rotation : (N, 256) float32
         In and out: pose rows.
     pose_pelvis : (N, 3) float32
@@ -333,6 +449,8 @@ def reach_crowd(
         Places for the points of the hands, root frame, m.
     out_target_rotation : (N, 2, 4) float32
         Rotations of the hands, root frame.
+    out_kept : (N, 2) float32
+        Share of the last corrections from which inverse kinematics starts.
 
     Notes
     -----
@@ -365,7 +483,9 @@ def reach_crowd(
                 number[chunk],
                 real[chunk],
                 rows[chunk],
+                correction[character],
                 out_task,
                 out_target,
                 out_target_rotation,
+                out_kept,
             )

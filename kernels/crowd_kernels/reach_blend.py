@@ -74,6 +74,8 @@ class ReachKeys(NamedTuple):
     """(J,) Group of each compact joint."""
     chain: npt.NDArray[np.int32]
     """(2, 9) Compact joints from pelvis to right and left hand."""
+    chain_place: npt.NDArray[np.int32]
+    """(2, 9) Their places in the tree of inverse kinematics."""
     chain_offset: npt.NDArray[np.float64]
     """(2, 9, 3) Their rest offsets in the parent's frame, m."""
     chain_segment: npt.NDArray[np.int32]

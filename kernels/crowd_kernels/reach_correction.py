@@ -44,17 +44,25 @@ def set_joint_rotation(tree: TreeArrays, k: int, rotation: Quaternion, out_row: 
 
 
 @inlined_kernel
-def is_asked(tree: TreeArrays, task: Any, k: int) -> bool:
-    """Tell whether a joint moves an effector that has a task."""
-    asked = False
+def kept_of(tree: TreeArrays, task: Any, kept: Any, k: int) -> Any:
+    """Find the share of its last correction that a joint keeps: the largest of the effectors it moves."""
+    share = ZERO
     for e in range(tree.effector.shape[0]):
-        asked |= tree.moves[e, k] != 0 and task[tree.column[e]] != 0
-    return asked
+        column = tree.column[e]
+        if tree.moves[e, k] != 0 and task[column] != 0:
+            share = max(share, kept[column])
+    return share
 
 
 @parallel_kernel
 def start_solves(
-    tree: TreeArrays, task: Any, correction: Any, pose_rotation: Any, active: Any, out_rotation: Any
+    tree: TreeArrays,
+    task: Any,
+    kept: Any,
+    correction: Any,
+    pose_rotation: Any,
+    active: Any,
+    out_rotation: Any,
 ) -> None:
     """Turn blended poses by the last corrections: where the next solves start.
 
@@ -64,6 +72,8 @@ def start_solves(
         K joints, at most 32, of all effectors.
     task : (N, >= E) uint8
         What is asked of each effector, 0 for nothing. Joints that move none with a task are not corrected.
+    kept : (N, >= E) float32
+        Share of the last correction that is still made for each effector, 0 to 1.
     correction : (N, 96) float32
         Vector part of the last correction: component c of the tree's joint k stands at 32 c + k.
     pose_rotation : (N, L) float32
@@ -87,8 +97,9 @@ def start_solves(
             row = correction[character]
             for k in range(tree.joint.shape[0]):
                 rotation = joint_rotation(tree, k, pose_rotation[character])
-                if is_asked(tree, task[character], k):
-                    x, y, z = row[k], row[LANES + k], row[2 * LANES + k]
+                share = kept_of(tree, task[character], kept[character], k)
+                if share > ZERO:
+                    x, y, z = share * row[k], share * row[LANES + k], share * row[2 * LANES + k]
                     w = np.sqrt(max(ONE - x * x - y * y - z * z, ZERO))
                     rotation = unit_quaternion(multiply((w, x, y, z), rotation))
                 set_joint_rotation(tree, k, rotation, out_rotation[character])

@@ -57,6 +57,8 @@ class ReachLimits(NamedTuple):
     """Rate with which a rotation that is asked for on the way comes and goes, 1/s."""
     farthest: float
     """Farthest that inverse kinematics takes a hand from where the examples bring it, m."""
+    missing_rate: float
+    """Rate with which what could not be had is made up for, 1/s."""
     example_rate: float
     """Rate of the critically damped change of the examples' weights, 1/s."""
 
@@ -93,6 +95,8 @@ class ReachState(NamedTuple):
     turn_velocity: npt.NDArray[np.float64]
     turn_acceleration: npt.NDArray[np.float64]
     rotation_share: npt.NDArray[np.float64]
+    missing_place: npt.NDArray[np.float64]
+    missing_turn: npt.NDArray[np.float64]
     example: npt.NDArray[np.int32]
     """(N, 2, 24) Examples that are blended; slots of weight 0 are free."""
     example_weight: npt.NDArray[np.float64]

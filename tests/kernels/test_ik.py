@@ -142,15 +142,24 @@ def crowd_of(tree, rng, count):
 @pytest.mark.parametrize("task", [1, 2, 3])
 @pytest.mark.parametrize("is_limited", [False, True])
 @pytest.mark.parametrize("make", [arm, both_arms])
-@pytest.mark.parametrize(("place_first", "approach"), [(0, 1.0), (1, 1.0), (1, 0.2)])
-def test_one_iteration_matches_the_slow_twin(rng, place_first, approach, make, is_limited, task):
+@pytest.mark.parametrize(
+    ("place_first", "approach", "turn_error_damping"), [(0, 1.0, 0.0), (1, 1.0, 0.0), (1, 0.2, 6.0)]
+)
+def test_one_iteration_matches_the_slow_twin(
+    rng, place_first, approach, turn_error_damping, make, is_limited, task
+):
     tree = make(is_limited=is_limited)
     crowd = crowd_of(tree, rng, 24)
     start = np.array([random_pose(tree, rng) for _ in range(24)])
     crowd.pose = crowd.rows(start)
     crowd.reference = crowd.rows(np.tile(resting(tree), (24, 1, 1)))
     crowd.task[:] = task
-    settings = SETTINGS._replace(most_iterations=1, place_first=place_first, approach=approach)
+    settings = SETTINGS._replace(
+        most_iterations=1,
+        place_first=place_first,
+        approach=approach,
+        turn_error_damping=turn_error_damping,
+    )
     crowd.solve(**settings._asdict())
     for character, got in enumerate(crowd.local()):
         wanted = oracle.iterate(

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from crowd.bench.reach import Reachers
 from crowd.controllers.reach import REACH_LIMITS
-from crowd_kernels.reach import reach_crowd
+from crowd.motion.rotation import multiply
+from crowd_kernels.reach import carried_hand, reach_crowd
+from crowd_kernels.reach_correction import LANES as CORRECTED
 from crowd_kernels.reach_goal import (
     HOLD,
     MOVE,
@@ -98,7 +100,8 @@ def test_reach_matches_oracle(reachers, hand, course, rng):
         space.arrays, keys, REACH_LIMITS, simulation.model.people.segment_scale, reachers.size,
         state.position_world, state.yaw, state.is_seated, np.zeros(24), reachers.rows, 1e-5,
         ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields)),
-        reach._number, reach._real, reach._rows, pose, pelvis, task, out, np.zeros((24, 2, 4), np.float32),
+        reach._number, reach._real, reach._rows, state.reach_correction, pose, pelvis,
+        task, out, np.zeros((24, 2, 4), np.float32), np.zeros((24, 2), np.float32),
     )  # fmt: skip
     first = [0, len(space.examples[0].clips)][hand]
     for row in range(24):
@@ -118,6 +121,25 @@ def test_reach_matches_oracle(reachers, hand, course, rng):
         np.testing.assert_allclose(pelvis[row], wanted[1], atol=1e-5)
         np.testing.assert_allclose(out[row, hand], wanted[2], atol=5e-5)
         assert task[row].tolist() == [int(hand == 0), int(hand == 1)]
+
+
+@pytest.mark.parametrize("arm", [0, 1])
+def test_a_carried_hand_hangs_on_the_corrected_trunk(reachers, arm, rng):
+    simulation, keys = reachers.simulation, reachers.space.keys
+    tree = simulation.reach._tree
+    np.testing.assert_array_equal(tree.joint[keys.chain_place], keys.joint[keys.chain])
+    pose = simulation.state.pose_rotation[0].copy()
+    correction = rng.uniform(-0.2, 0.2, 3 * CORRECTED).astype(np.float32)
+    local = pose.reshape(4, 64)[:, keys.joint].T.astype(float)
+    for compact in set(keys.chain[0]) & set(keys.chain[1]):
+        at = np.flatnonzero(tree.joint == keys.joint[compact])[0]
+        x, y, z = correction[at::CORRECTED].astype(float)
+        local[compact] = multiply([np.sqrt(1 - x * x - y * y - z * z), x, y, z], local[compact])
+    scale = simulation.model.people.segment_scale[0]
+    place, turned = carried_hand(keys, arm, scale, (0.1, 0.9, 0.0), pose, correction)
+    wanted, frame = oracle.place_hand(keys, arm, scale.astype(float), (0.1, 0.9, 0.0), local)
+    np.testing.assert_allclose(place, wanted, atol=1e-6)
+    np.testing.assert_allclose(abs(np.dot(turned, frame)), 1.0, atol=1e-6)
 
 
 def status_after(stage, status, distance, angle, has_rotation=False, hold=math.inf):

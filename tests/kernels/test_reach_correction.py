@@ -15,6 +15,7 @@ COUNT = 6
 ACTIVE = np.array([4, 1, 2, 5], np.int32)
 INACTIVE = [0, 3]
 BOTH = np.full((COUNT, 2), 1, np.uint8)
+WHOLE = np.ones((COUNT, 2), np.float32)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -41,9 +42,10 @@ def test_solves_start_from_the_corrected_blend(seed):
     pose, start = poses(rng), np.full((COUNT, 4 * PADDED_JOINTS), np.nan, np.float32)
     correction = rng.uniform(-0.5, 0.5, (COUNT, 3 * LANES)).astype(np.float32)
     task = rng.integers(0, 4, (COUNT, 2)).astype(np.uint8)
-    start_solves(TREE, task, correction, pose, ACTIVE, start)
+    share = rng.uniform(0.0, 1.0, (COUNT, 2)).astype(np.float32)
+    start_solves(TREE, task, share, correction, pose, ACTIVE, start)
     for i in ACTIVE:
-        wanted = oracle.started(TREE, task[i], vectors(correction[i]), local(pose[i]))
+        wanted = oracle.started(TREE, task[i], share[i], vectors(correction[i]), local(pose[i]))
         same = np.abs(np.sum(wanted * local(start[i]), axis=1))
         np.testing.assert_allclose(same, 1.0, atol=1e-6)
     assert np.isnan(start[INACTIVE]).all()
@@ -63,7 +65,7 @@ def test_what_is_kept_brings_the_blend_to_the_solution_again(seed):
         np.testing.assert_allclose(vectors(correction[i])[clear], wanted[clear], atol=1e-5)
         np.testing.assert_array_equal(local(pose[i])[turning], local(solution[i])[turning])
         np.testing.assert_array_equal(local(pose[i])[~turning], local(before[i])[~turning])
-        again = oracle.started(TREE, BOTH[i], vectors(correction[i]), local(before[i]))
+        again = oracle.started(TREE, BOTH[i], WHOLE[i], vectors(correction[i]), local(before[i]))
         same = np.abs(np.sum(again * local(pose[i]), axis=1))
         np.testing.assert_allclose(same[clear], 1.0, atol=1e-4)
     others = np.setdiff1d(np.arange(PADDED_JOINTS), TREE.joint)
@@ -76,7 +78,7 @@ def test_what_is_kept_brings_the_blend_to_the_solution_again(seed):
 def test_no_correction_leaves_the_pose_as_it_is(rng):
     pose, start = poses(rng), np.zeros((COUNT, 4 * PADDED_JOINTS), np.float32)
     correction = np.zeros((COUNT, 3 * LANES), np.float32)
-    start_solves(TREE, BOTH, correction, pose, ACTIVE, start)
+    start_solves(TREE, BOTH, WHOLE, correction, pose, ACTIVE, start)
     for i in ACTIVE:
         np.testing.assert_allclose(local(start[i]), local(pose[i]), atol=1e-6)
     keep_corrections(TREE, pose.copy(), ACTIVE, pose, correction)
@@ -88,7 +90,7 @@ def test_an_arm_without_a_task_keeps_no_correction(rng):
     pose, start = poses(rng), np.zeros((COUNT, 4 * PADDED_JOINTS), np.float32)
     correction = np.full((COUNT, 3 * LANES), 0.2, np.float32)
     right = np.tile(np.array([1, 0], np.uint8), (COUNT, 1))
-    start_solves(TREE, right, correction, pose, ACTIVE, start)
+    start_solves(TREE, right, WHOLE, correction, pose, ACTIVE, start)
     keep_corrections(TREE, start, ACTIVE, pose, correction)
     only_left = (TREE.moves[1] > 0) & (TREE.moves[0] == 0)
     for i in ACTIVE:

@@ -139,15 +139,15 @@ def iterate(tree, settings, local, reference, point, target, target_rotation, ta
                 jacobian[6 * e : 6 * e + 3, 3 * k : 3 * k + 3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
                 jacobian[6 * e + 3 : 6 * e + 6, 3 * k : 3 * k + 3] = np.eye(3)
     jacobian[~rows] = 0
-    damping = settings.damping**2 + settings.error_damping * sum(
-        np.linalg.norm(miss[6 * e : 6 * e + 3]) for e in range(effectors)
-    )
+    steps = np.linalg.norm(miss.reshape(effectors, 2, 3), axis=2).sum(axis=0)
+    damping = settings.damping**2 + steps * (settings.error_damping, settings.turn_error_damping)
+    damping = np.tile(np.repeat(damping, 3), effectors)
     for _ in range(settings.passes):
         weights = np.zeros((3 * count, 3 * count))
         for k, motion in enumerate(motions):
             weights[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = motion.mobility
         drift = np.concatenate([motion.drift for motion in motions])
-        system = jacobian @ weights @ jacobian.T + damping * np.eye(6 * effectors)
+        system = jacobian @ weights @ jacobian.T + np.diag(damping)
         step = drift + weights @ jacobian.T @ np.linalg.solve(system, miss - jacobian @ drift)
         found, is_done = [], True
         for k in range(count):

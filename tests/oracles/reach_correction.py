@@ -5,12 +5,14 @@ import numpy as np
 from tests.oracles.ik import quaternion, rotation
 
 
-def started(tree, task, vector, local):
-    """Local rotations (K, 4) of a blended pose, turned by corrections (K, 3) where a task (E,) is near."""
+def started(tree, task, share, vector, local):
+    """Local rotations (K, 4) of a blend, turned by shares (E,) of corrections (K, 3) where tasks (E,) are."""
     result = np.array(local, float)
-    for k in np.flatnonzero(tree.moves[np.array(task) != 0].any(axis=0)):
-        scalar = np.sqrt(max(1 - vector[k] @ vector[k], 0))
-        result[k] = quaternion(rotation([scalar, *vector[k]]) * rotation(local[k]))
+    for k, moved in enumerate((tree.moves != 0).T & (np.array(task) != 0)):
+        if moved.any():
+            turn = np.max(np.asarray(share, float)[moved]) * vector[k]
+            scalar = np.sqrt(max(1 - turn @ turn, 0))
+            result[k] = quaternion(rotation([scalar, *turn]) * rotation(local[k]))
     return result
 
 

@@ -1,0 +1,94 @@
+"""Reaches go on smoothly when hands come and go one after the other, and below what they cannot have."""
+
+import numpy as np
+import pytest
+
+from crowd.bench.reach import (
+    LARGEST_JITTER,
+    LARGEST_RATIO,
+    Reachers,
+    angular_motion,
+    example_acceleration,
+    random_targets,
+    random_turns,
+)
+from crowd.motion.rotation import from_vector, multiply
+from crowd_kernels.reach_goal import OUT_OF_REACH, REACHED
+
+PEOPLE = 60
+
+
+@pytest.fixture
+def reachers():
+    made = Reachers(PEOPLE, seed=5)
+    for _ in range(3):
+        made.step()
+    return made
+
+
+def frames(reachers, count):
+    """Rotations (F, N, J, 4) over some steps."""
+    found = []
+    for _ in range(count):
+        reachers.step()
+        found.append(reachers.local_rotations())
+    return found
+
+
+def before_the_body(reachers, hand, rng):
+    """Targets where people work with both hands, on the hand's own side."""
+    target = rng.uniform((-0.45, 0.75, 0.3), (0.0, 1.5, 0.55), (PEOPLE, 3)) * reachers.size[:, None]
+    return target * ((1, 1, 1) if hand == 0 else (-1, 1, 1))
+
+
+def allowed(reachers):
+    clips = tuple(clip for part in reachers.space.examples for clip in part.clips)
+    return LARGEST_RATIO * example_acceleration(clips, reachers.space.keys.joint)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_nothing_jumps_when_the_second_hand_comes_and_goes_while_the_first_one_holds(reachers, first, rng):
+    simulation, second = reachers.simulation, 1 - first
+    end = simulation.reach.end
+    shown = []
+    reachers.reach(first, before_the_body(reachers, first, rng))
+    shown += frames(reachers, 90)
+    reachers.reach(second, before_the_body(reachers, second, rng))
+    shown += frames(reachers, 100)
+    assert (simulation.state.reach_status == REACHED).all()
+    end(simulation.state, reachers.rows, second)
+    shown += frames(reachers, 110)
+    end(simulation.state, reachers.rows, first)
+    shown += frames(reachers, 110)
+    assert not simulation.state.reach_stage.any()
+    assert angular_motion(np.array(shown), simulation.dt)[1] < allowed(reachers)
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+@pytest.mark.parametrize("is_far", [False, True])
+def test_hands_rest_below_rotations_that_they_cannot_have(reachers, hand, is_far, rng):
+    """Near targets are met all the same, and what of the rotation is out of reach is reported."""
+    state = reachers.simulation.state
+    target = random_targets(reachers, hand, rng, is_far=is_far)
+    reachers.reach(hand, target)
+    frames(reachers, 85)
+    turned = multiply(from_vector(2.4 * random_turns(PEOPLE, rng)), reachers.hand(hand)[1])
+    reachers.simulation.reach.end(state, reachers.rows, hand)
+    frames(reachers, 110)
+    reachers.reach(hand, target, turned)
+    frames(reachers, 150)
+    places = []
+    for _ in range(20):
+        reachers.step()
+        places.append(reachers.hand(hand)[0])
+    shaking = np.linalg.norm(np.diff(places, axis=0), axis=2).max(axis=0)
+    assert shaking.max() < (1e-3 if is_far else LARGEST_JITTER)
+    assert np.quantile(shaking, 0.95) < LARGEST_JITTER
+    status = state.reach_status[:, hand]
+    assert np.isin(status, (REACHED, OUT_OF_REACH)).all()
+    assert (status == OUT_OF_REACH).mean() > 0.3
+    angle = 2 * np.arccos(np.minimum(np.abs((turned * reachers.hand(hand)[1]).sum(axis=1)), 1))
+    assert (angle[status == OUT_OF_REACH] > np.radians(0.9)).all() or is_far
+    if not is_far:
+        assert np.linalg.norm(places[-1] - target, axis=1).max() < 5e-3
+        assert np.median(angle) < 2.4 / 2
