@@ -15,15 +15,8 @@ from crowd.motion.skeleton import Segment
 from crowd_kernels import _jit
 from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.ik import (
-    CHUNKS,
-    SETTINGS,
-    SolveSettings,
-    TreeArrays,
-    plain_tree,
-    scratch_length,
-    solve_crowd,
-)
+from crowd_kernels.ik import CHUNKS, SETTINGS, SolveSettings, scratch_length, solve_crowd
+from crowd_kernels.ik_tree import TreeArrays, plain_tree
 
 Array = npt.NDArray[Any]
 

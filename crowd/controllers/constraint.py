@@ -14,16 +14,9 @@ from crowd.motion.skeleton import Segment, Skeleton
 from crowd.state import ByteArray, Float32Array, IntArray, State
 from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.hold import aim_holds, apply_holds, hold_effectors
-from crowd_kernels.ik import (
-    CHUNKS,
-    POSITION,
-    ROTATION_TOO,
-    SETTINGS,
-    SolveSettings,
-    TreeArrays,
-    scratch_length,
-    solve_crowd,
-)
+from crowd_kernels.ik import CHUNKS, SETTINGS, SolveSettings, scratch_length, solve_crowd
+from crowd_kernels.ik_gather import POSITION, ROTATION_TOO
+from crowd_kernels.ik_tree import TreeArrays
 from crowd_kernels.reach_goal import HOLD
 
 EFFECTORS = ("right_hand", "left_hand", "head")

@@ -9,7 +9,7 @@ from crowd.errors import MotionError, describe, nearest_first
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.motion.swing_twist import swing_twist_limits
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.ik import TreeArrays, find_chains
+from crowd_kernels.ik_tree import TreeArrays, find_chains
 
 WEIGHTS: dict[str, float] = {
     "pelvis": 0.1,

@@ -7,7 +7,9 @@ import math
 from typing import Any
 
 from crowd_kernels._jit import kernel, parallel_kernel, prange
-from crowd_kernels.ik import NONE, POSITION, ROTATION_TOO, TreeArrays
+from crowd_kernels.ik import NONE
+from crowd_kernels.ik_gather import POSITION, ROTATION_TOO
+from crowd_kernels.ik_tree import TreeArrays
 from crowd_kernels.quaternion import Quaternion, conjugate, from_yaw, multiply, normalized, rotate
 from crowd_kernels.reach_goal import NONE as NO_REACH
 from crowd_kernels.reach_goal import RETURN

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
-from crowd_kernels.ik import TreeArrays
-from crowd_kernels.ik_rows import unit_quaternion
+from crowd_kernels.ik_layout import unit_quaternion
+from crowd_kernels.ik_tree import TreeArrays
 from crowd_kernels.quaternion import Quaternion, conjugate, multiply
 
 CHUNKS = 32

@@ -169,6 +169,11 @@ def find_missing_crowd(
         In and out: `missing_place` and `missing_turn`, what was spared and what is missing.
     out_angle : (N, 2) float32
         Angle to the rotation wanted, rad; 0 where none is.
+
+    Notes
+    -----
+    **Source:** Feng, Xu, Shapiro, section 5.2: the target of inverse kinematics varies in time.
+    **Differs from the source:** targets that were missed are approached again at a given rate.
     """
     count = active.shape[0]
     for chunk in prange(CHUNKS):

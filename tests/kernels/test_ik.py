@@ -12,10 +12,10 @@ from crowd_kernels.ik import (
     REACHED,
     REFUSED,
     SETTINGS,
-    plain_tree,
     scratch_length,
     solve_crowd,
 )
+from crowd_kernels.ik_tree import plain_tree
 from tests.oracles import ik as oracle
 
 SKELETON = build_skeleton()

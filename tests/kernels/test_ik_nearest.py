@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from crowd_kernels.ik import OUT_OF_REACH, plain_tree
+from crowd_kernels.ik import OUT_OF_REACH
+from crowd_kernels.ik_tree import plain_tree
 from crowd_kernels.joint_limit import LimitArrays
 from tests.kernels.test_ik import POINT, Crowd, arm, resting
 from tests.oracles import ik as oracle

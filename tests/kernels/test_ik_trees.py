@@ -11,10 +11,10 @@ from crowd_kernels.ik import (
     OUT_OF_REACH,
     REACHED,
     SETTINGS,
-    plain_tree,
     scratch_length,
     solve_crowd,
 )
+from crowd_kernels.ik_tree import plain_tree
 from crowd_kernels.joint_limit import LimitArrays
 from tests.oracles import ik as oracle
 

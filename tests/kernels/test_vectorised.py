@@ -10,7 +10,7 @@ import numba
 import pytest
 from llvmlite import binding
 
-from crowd_kernels import _jit, clip, gaze_rows, ik_rows, lanes, pose
+from crowd_kernels import _jit, clip, gaze_rows, ik_effector, ik_joint, ik_limit, ik_system, lanes, pose
 
 FEATURES = binding.get_host_cpu_features()
 ROW = numba.float32[::1]
@@ -47,20 +47,20 @@ ARITHMETIC_LEAVES = {
 }
 QUATERNION = numba.types.UniTuple(NUMBER, 4)
 ARITHMETIC_LEAVES |= {
-    ik_rows.forward_row: (ROW, ROW, NUMBER, NUMBER, NUMBER, ROW),
-    ik_rows.pull_row: (ROW, NUMBER, NUMBER, ROW),
-    ik_rows.subtract_drift_row: (ROW, ROW, ROW),
-    ik_rows.accumulate_place_row: (ROW, ROW, ROW, ROW),
-    ik_rows.accumulate_frame_row: (ROW, ROW, ROW, ROW),
-    ik_rows.accumulate_free_place_row: (ROW, NUMBER, ROW, ROW, ROW),
-    ik_rows.accumulate_free_frame_row: (ROW, NUMBER, ROW, ROW, ROW),
-    ik_rows.accumulate_free_cross_row: (ROW, NUMBER, ROW, ROW, ROW),
-    ik_rows.add_torque_row: (ROW, ROW, numba.boolean, ROW),
-    ik_rows.step_row: (ROW, ROW, ROW),
-    ik_rows.free_step_row: (ROW, NUMBER, ROW, ROW),
-    ik_rows.find_limit_row: (QUATERNION, QUATERNION, *[NUMBER] * 3, ROW),
-    ik_rows.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW),
-    ik_rows.subtract_block: (ROW, ROW, ROW),
+    ik_joint.forward_row: (ROW, ROW, NUMBER, NUMBER, NUMBER, ROW),
+    ik_joint.pull_row: (ROW, NUMBER, NUMBER, ROW),
+    ik_effector.subtract_drift_row: (ROW, ROW, ROW),
+    ik_effector.accumulate_place_row: (ROW, ROW, ROW, ROW),
+    ik_effector.accumulate_frame_row: (ROW, ROW, ROW, ROW),
+    ik_effector.accumulate_free_place_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_effector.accumulate_free_frame_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_effector.accumulate_free_cross_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_effector.add_torque_row: (ROW, ROW, numba.boolean, ROW),
+    ik_joint.step_row: (ROW, ROW, ROW),
+    ik_joint.free_step_row: (ROW, NUMBER, ROW, ROW),
+    ik_limit.find_limit_row: (QUATERNION, QUATERNION, *[NUMBER] * 3, ROW),
+    ik_limit.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW),
+    ik_system.subtract_block: (ROW, ROW, ROW),
 }
 SHUFFLE_LEAVES = {
     lanes.interleave: (ROW, ROW, ROW, ROW, INTEGER, ROW),

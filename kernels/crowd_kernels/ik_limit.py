@@ -1,0 +1,294 @@
+"""Row leaves of inverse kinematics that keep one joint within its limits, by fixing directions."""
+
+from typing import Any
+
+import numpy as np
+
+from crowd_kernels._jit import inlined_kernel
+from crowd_kernels.ik_joint import moved
+from crowd_kernels.ik_layout import (
+    DRIFT,
+    FRAME,
+    HELD,
+    IS_FIXED,
+    MOBILITY,
+    NEXT,
+    NEXT_SWING,
+    ONE,
+    REFERENCE,
+    ROOM,
+    ROTATION,
+    SWING_BOUND,
+    TINY,
+    TWIST_BOUND,
+    TWO,
+    ZERO,
+    put_quaternion,
+    put_vector,
+    quaternion_at,
+    vector_at,
+)
+from crowd_kernels.joint_limit import into_limit, join, out_of_limit, split, swing_normal, twist_normal
+from crowd_kernels.lanes import LANES
+from crowd_kernels.quaternion import Quaternion, conjugate, multiply, rotate
+from crowd_kernels.vector import Vector, dot
+
+FREE_SHARE: Any = np.float32(1e-3)
+SLACK: Any = np.float32(2e-5)
+
+
+@inlined_kernel
+def begin_fixing_row(weight: Any, row: Any) -> None:
+    """Give a joint that turns freely the mobility from which directions can be taken.
+
+    Parameters
+    ----------
+    weight : float32
+        How easily the joint turns.
+    row : (JOINT_ROW,) float32
+        The joint: its mobility is written.
+    """
+    for lane in range(LANES):
+        first = MOBILITY + lane
+        row[first] = weight
+        row[first + LANES] = ZERO
+        row[first + 2 * LANES] = ZERO
+        row[first + 3 * LANES] = weight
+        row[first + 4 * LANES] = ZERO
+        row[first + 5 * LANES] = weight
+    row[IS_FIXED] = ONE
+
+
+@inlined_kernel
+def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, weight: Any, share: Any) -> None:
+    """Let a joint turn along one direction by a given amount, whatever the torque.
+
+    Parameters
+    ----------
+    row : (JOINT_ROW,) float32
+        The joint: its mobility loses the direction, its drift gets the motion.
+    lane : int
+    normal : tuple of float32
+        The direction, of any length, root frame.
+    motion : float32
+        Scalar product of the normal and the rotation vector that is wanted.
+    weight : float32
+        How easily the joint turns while nothing is fixed. A direction that has hardly any of it left is
+        fixed already.
+    share : float32
+        1 to do it, 0 to leave the joint as it is.
+    """
+    first = MOBILITY + lane
+    mx, my, mz = moved(row, lane, normal)
+    pivot = normal[0] * mx + normal[1] * my + normal[2] * mz
+    least = FREE_SHARE * weight * dot(normal, normal) + TINY
+    inverse = share / max(pivot, least) if pivot > least else ZERO
+    drift = vector_at(row, DRIFT, lane)
+    factor = (motion - dot(normal, drift)) * inverse
+    put_vector(row, DRIFT, lane, (drift[0] + mx * factor, drift[1] + my * factor, drift[2] + mz * factor))
+    row[first] -= mx * mx * inverse
+    row[first + LANES] -= mx * my * inverse
+    row[first + 2 * LANES] -= mx * mz * inverse
+    row[first + 3 * LANES] -= my * my * inverse
+    row[first + 4 * LANES] -= my * mz * inverse
+    row[first + 5 * LANES] -= mz * mz * inverse
+
+
+@inlined_kernel
+def hold_reference_row(
+    parent_frame: Quaternion,
+    joint_frame: Quaternion,
+    inverse_x: Any,
+    inverse_y: Any,
+    low: Any,
+    high: Any,
+    row: Any,
+) -> None:
+    """Note swing and twist of the reference pose, and widen limits that it leaves.
+
+    Parameters
+    ----------
+    parent_frame, joint_frame : tuple of float32
+    inverse_x, inverse_y : float32
+        See `LimitArrays.inverse_swing`.
+    low, high : float32
+        See `LimitArrays.twist`.
+    row : (JOINT_ROW,) float32
+        The joint: bounds and held values are written.
+    """
+    for lane in range(LANES):
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, REFERENCE, lane), joint_frame))
+        row[SWING_BOUND + lane] = max(ONE, x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y)
+        row[TWIST_BOUND + lane] = min(low, twist)
+        row[TWIST_BOUND + LANES + lane] = max(high, twist)
+        put_vector(row, HELD, lane, (x, y, twist))
+
+
+@inlined_kernel
+def lock_axis_row(
+    above: Any, weight: Any, parent_frame: Quaternion, joint_frame: Quaternion, axis: int, row: Any
+) -> None:
+    """Take one axis of a joint out of its mobility and drift.
+
+    Parameters
+    ----------
+    above : (JOINT_ROW,) float32
+        The parent.
+    weight : float32
+        How easily the joint turns.
+    parent_frame, joint_frame : tuple of float32
+    axis : int
+        0 swing about x, 1 swing about y, 2 twist.
+    row : (JOINT_ROW,) float32
+        The joint.
+    """
+    along_x = ONE if axis == 0 else ZERO
+    along_y = ONE if axis == 1 else ZERO
+    twisting = ONE if axis == 2 else ZERO
+    for lane in range(LANES):
+        x, y, _ = split(into_limit(parent_frame, quaternion_at(row, ROTATION, lane), joint_frame))
+        swing = swing_normal(x, y, along_x, along_y)
+        twist = twist_normal(x, y)
+        normal = rotate(
+            multiply(quaternion_at(above, FRAME, lane), parent_frame),
+            (
+                swing[0] + twisting * (twist[0] - swing[0]),
+                swing[1] + twisting * (twist[1] - swing[1]),
+                swing[2] + twisting * (twist[2] - swing[2]),
+            ),
+        )
+        fix_direction(row, lane, normal, ZERO, weight, ONE)
+
+
+@inlined_kernel
+def find_limit_row(
+    parent_frame: Quaternion,
+    joint_frame: Quaternion,
+    inverse_x: Any,
+    inverse_y: Any,
+    approach: Any,
+    row: Any,
+) -> bool:
+    """Find swing and twist of a joint's next rotation, and how far they may go in this iteration.
+
+    Parameters
+    ----------
+    parent_frame, joint_frame : tuple of float32
+    inverse_x, inverse_y : float32
+        See `LimitArrays.inverse_swing`.
+    approach : float32
+        Largest share of the way to a limit that the joint goes now.
+    row : (JOINT_ROW,) float32
+        The joint: next swing and room are written.
+
+    Returns
+    -------
+    bool
+        Someone's joint would leave its limits.
+    """
+    is_outside = False
+    for lane in range(LANES):
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, ROTATION, lane), joint_frame))
+        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
+        bound = row[SWING_BOUND + lane]
+        # Up to a share of the way to the limit, so that joints come to rest there softly.
+        radius = np.sqrt(value) + approach * max(np.sqrt(bound) - np.sqrt(value), ZERO)
+        bound = min(radius * radius, bound)
+        low, high = row[TWIST_BOUND + lane], row[TWIST_BOUND + LANES + lane]
+        low = max(low, twist + approach * min(low - twist, ZERO))
+        high = min(high, twist + approach * max(high - twist, ZERO))
+        put_vector(row, ROOM, lane, (bound, low, high))
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
+        put_vector(row, NEXT_SWING, lane, (x, y, twist))
+        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
+        is_outside |= (value > bound) | (twist > high) | (twist < low)
+    return is_outside
+
+
+@inlined_kernel
+def limit_row(
+    above: Any,
+    weight: Any,
+    parent_frame: Quaternion,
+    joint_frame: Quaternion,
+    inverse_x: Any,
+    inverse_y: Any,
+    free_x: Any,
+    free_y: Any,
+    free_twist: Any,
+    is_running: Any,
+    row: Any,
+    out_violations: Any,
+) -> None:
+    """Bring a joint's next rotation into its limits, and fix the directions that would have left them.
+
+    Parameters
+    ----------
+    above : (JOINT_ROW,) float32
+        The parent.
+    weight : float32
+        How easily the joint turns.
+    parent_frame, joint_frame : tuple of float32
+    inverse_x, inverse_y : float32
+        See `LimitArrays.inverse_swing`.
+    free_x, free_y, free_twist : float32
+        See `LimitArrays.is_free`.
+    is_running : (16,) float32
+        0 where the character stays as it is.
+    row : (JOINT_ROW,) float32
+        The joint, after `find_limit_row`: its next rotation is projected; drift and mobility lose what is
+        fixed.
+    out_violations : (16,) float32
+        Grows by the number of directions that were fixed.
+
+    Notes
+    -----
+    Rotations within their limits keep their bits, so that nobody's pose depends on who shares the row.
+    """
+    is_free = free_x * free_y * free_twist
+    for lane in range(LANES):
+        x, y, twist = vector_at(row, NEXT_SWING, lane)
+        bound, low, high = vector_at(row, ROOM, lane)
+        held = vector_at(row, HELD, lane)
+        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
+        is_inside = (value <= bound) & (twist >= low) & (twist <= high) & (is_free > ZERO)
+        share = np.sqrt(bound / max(value, bound))
+        swings_out = is_running[lane] if value > bound + SLACK * bound else ZERO
+        twists_out = is_running[lane] if (twist > high + SLACK) | (twist < low - SLACK) else ZERO
+        twists_out *= free_twist
+        x = held[0] + free_x * (x * share - held[0])
+        y = held[1] + free_y * (y * share - held[1])
+        twist = held[2] + free_twist * (min(max(twist, low), high) - held[2])
+        inside = out_of_limit(parent_frame, join(x, y, twist), joint_frame)
+        before = quaternion_at(row, ROTATION, lane)
+        sign = (
+            ONE
+            if before[0] * inside[0] + before[1] * inside[1] + before[2] * inside[2] + before[3] * inside[3]
+            >= ZERO
+            else -ONE
+        )
+        run = sign * is_running[lane]
+        stays = ONE - is_running[lane]
+        after = quaternion_at(row, NEXT, lane)
+        put_quaternion(
+            row,
+            NEXT,
+            lane,
+            (
+                after[0] if is_inside else run * inside[0] + stays * before[0],
+                after[1] if is_inside else run * inside[1] + stays * before[1],
+                after[2] if is_inside else run * inside[2] + stays * before[2],
+                after[3] if is_inside else run * inside[3] + stays * before[3],
+            ),
+        )
+        # The rotation vector to the projection, as the update measures it.
+        way = multiply(inside, conjugate(before))
+        scale = TWO / (way[0] if way[0] * way[0] > TINY else ONE)
+        outer = quaternion_at(above, FRAME, lane)
+        motion = rotate(outer, (way[1] * scale, way[2] * scale, way[3] * scale))
+        frame = multiply(outer, parent_frame)
+        normal = rotate(frame, swing_normal(x, y, x * inverse_x * inverse_x, y * inverse_y * inverse_y))
+        fix_direction(row, lane, normal, dot(normal, motion), weight, swings_out)
+        normal = rotate(frame, twist_normal(x, y))
+        fix_direction(row, lane, normal, dot(normal, motion), weight, twists_out)
+        out_violations[lane] += swings_out + twists_out
