@@ -41,7 +41,7 @@ from crowd_kernels.gaze_rows import (
     turn_frame_row,
 )
 from crowd_kernels.lanes import LANES
-from crowd_kernels.polynomial import ONE, ZERO
+from crowd_kernels.polynomial import ONE, ZERO, sine_cosine
 
 TURNED = np.float32(0.1)
 """From this turn on people keep to the side that they have turned to, rad."""
@@ -131,12 +131,10 @@ def gather_root(
     last = active.shape[0] - 1
     for lane in range(LANES):
         character = active[min(first + lane, last)]
-        cosine, sine = math.cos(yaw[character]), math.sin(yaw[character])
-        x = target_world[character, 0] - position_world[character, 0]
-        z = target_world[character, 2] - position_world[character, 2]
-        carry[TARGET + lane] = cosine * x - sine * z
+        carry[SIDE + lane] = yaw[character]
+        carry[TARGET + lane] = target_world[character, 0] - position_world[character, 0]
         carry[TARGET + LANES + lane] = target_world[character, 1]
-        carry[TARGET + 2 * LANES + lane] = sine * x + cosine * z
+        carry[TARGET + 2 * LANES + lane] = target_world[character, 2] - position_world[character, 2]
         leg = segment_scale[character, arrays.leg_segment]
         for axis in range(3):
             carry[POSITION + axis * LANES + lane] = pose_pelvis[character, axis] * leg
@@ -145,6 +143,11 @@ def gather_root(
         carry[FOLLOW + lane] = follow[character]
         carry[WEIGHT + lane] = weight[character]
         carry[WEIGHT_RATE + lane] = weight_rate[character]
+    for lane in range(LANES):
+        sine, cosine = sine_cosine(carry[SIDE + lane])
+        x, z = carry[TARGET + lane], carry[TARGET + 2 * LANES + lane]
+        carry[TARGET + lane] = cosine * x - sine * z
+        carry[TARGET + 2 * LANES + lane] = sine * x + cosine * z
 
 
 @inlined_kernel
