@@ -15,7 +15,6 @@ from crowd import checkpoint
 from crowd.checkpoint import Stateful
 from crowd.commands import Commands
 from crowd.controllers.animation import Animation
-from crowd.controllers.carrying import Carrying
 from crowd.controllers.constraint import Constraint, HandHolding
 from crowd.controllers.controller import Controller, Step
 from crowd.controllers.foot_lock import FootLock
@@ -122,7 +121,7 @@ class Simulation:
         self.reach = Reach(self.model.library, people.segment_scale, people.stature, self.model.world)
         self.joints = Joints(self.model.skeleton, capacity)
         self.grab = Grab(self.model, self.objects, self.joints, self.reach)
-        self.carrying = Carrying(self.model, self.grab)
+        self.carrying = self.grab.carrying
         self.gaze = Gaze(
             self.model.skeleton, capacity, self.navigator.avoidance, self.objects, self.model.placed
         )

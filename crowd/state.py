@@ -291,16 +291,35 @@ class State:
     finger_contact: ByteArray = _array(2, 15, dtype=np.uint8)
     """1 where the segment touches the object. (character, 2, 15)"""
 
-    is_carrying: BoolArray = _array(dtype=np.bool_)
-    """Both hands hold an object before the body. (character,)"""
+    carry_stage: ByteArray = _array(dtype=np.uint8)
+    """What both hands do with what they hold: 0 nothing, 1 it goes to or stays at a place, 2 it is carried
+    before the body, 3 its place was refused, 4 it is carried until the person stands. (character,)"""
     carry_progress: FloatArray = _array()
-    """Progress from where the object was taken to where it is carried, 0 to 1. (character,)"""
+    """Progress from where the object set out to where it goes, 0 to 1. (character,)"""
+    carry_seconds: FloatArray = _array()
+    """Length of this way, s; 0 until the hands move it first. (character,)"""
     carry_position: FloatArray = _array(3)
-    """Object in the root frame when carrying began, m. (character, 3)"""
+    """Where the hands have the object, in the root frame, m. (character, 3)"""
     carry_rotation: FloatArray = _array(4)
     """Its rotation in the root frame. (character, 4)"""
-    carry_target_world: FloatArray = _array(2, 3)
-    """Targets that carrying gave the hands last, m. (character, 2, 3)"""
+    carry_velocity: FloatArray = _array(3)
+    """m/s. (character, 3)"""
+    carry_turn_velocity: FloatArray = _array(3)
+    """rad/s. (character, 3)"""
+    carry_start_position: FloatArray = _array(3)
+    """Where the object set out, in the root frame, m. (character, 3)"""
+    carry_start_rotation: FloatArray = _array(4)
+    """Its rotation there. (character, 4)"""
+    carry_start_velocity: FloatArray = _array(3)
+    """Its velocity there, m/s. (character, 3)"""
+    carry_start_turn_velocity: FloatArray = _array(3)
+    """rad/s. (character, 3)"""
+    carry_grip_rotation: FloatArray = _array(4)
+    """Its rotation in the root frame when both hands took it, which is how it is carried. (character, 4)"""
+    carry_place_world: FloatArray = _array(3)
+    """Where its centre shall come when it has a place, m. (character, 3)"""
+    carry_place_rotation_world: FloatArray = _array(4)
+    """Rotation that it gets there. (character, 4)"""
     constraint_task: ByteArray = _array(3, dtype=np.uint8)
     """What is held of right hand, left hand and head: 0 nothing, 1 position, 2 rotation, 3 both.
     (character, effector)"""

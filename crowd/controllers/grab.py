@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from crowd.controllers.carrying import Carrying
 from crowd.controllers.controller import Step
 from crowd.controllers.grip_placement import GripPlacement
 from crowd.controllers.holding import Frames, Hands, Holding, composed
@@ -66,6 +67,8 @@ class GrabSettings:
     """rad. Likewise for its rotation."""
     slip: float = 0.05
     """m. A hand that is farther than this from what it touched touches it no more."""
+    nearness_of_both: float = 0.4
+    """Share of these at which two hands close together: what one still lacks, the other must give."""
     settle_distance: float = 0.01
     """m. An object let go this near to where it was to be put is put exactly there."""
 
@@ -106,6 +109,7 @@ class Grab:
         self.hand = hand_table(model.skeleton)
         self.shapes = shape_table(model.objects)
         self.placement = GripPlacement(model, self.hand, self.shapes, objects, joints)
+        self.carrying = Carrying(model, self.holding, self.placement, reach)
         self._scale = self.placement.scale
 
     def activate(self, state: State, characters: IntArray) -> None:
@@ -219,8 +223,12 @@ class Grab:
         place = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))[holds]
         turn = np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))[holds]
         at = rows[holds], hands[holds]
-        targets = self.holding.hand_targets(at, state.grab_object[at], place, turn)
-        self.reach.start(state, *at, *targets)
+        items = state.grab_object[at]
+        both = self.objects.holder_hand[items].all(axis=1)
+        self.carrying.bring(state, at[0][both], items[both], place[both], turn[both])
+        alone = at[0][~both], at[1][~both]
+        targets = self.holding.hand_targets(alone, items[~both], place[~both], turn[~both])
+        self.reach.start(state, *alone, *targets)
 
     def finger_gaps(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> FloatArray:
         """Measure how far fingers are from the objects that their hands go to or hold.
@@ -306,6 +314,7 @@ class Grab:
         touches = state.grab_status[rows, hands] == GrabStatus.TOUCHING
         if touches.any():
             self._keep_touching(state, (rows[touches], hands[touches]))
+        self.carrying.report(state)
         if waits.any():
             self._follow(state, (rows[waits], hands[waits]))
 
@@ -433,13 +442,15 @@ class Grab:
         state.grab_status[rows[follows], side[follows]] = GrabStatus.APPROACHING
 
     def _is_near(self, state: State, hands: Hands) -> BoolArray:
-        """Who is at the grip, within `near` and `near_angle`."""
+        """Who is at the grip, within `near` and `near_angle`; a share of them for both hands."""
         place, turn = self.holding.hands_in_world(state, hands)
         wanted_place, wanted_turn = self._wanted(state, hands)
         away = np.linalg.norm(place - wanted_place, axis=1)
         cosine = np.minimum(np.abs((turn * wanted_turn).sum(axis=1)), 1.0)
+        share = np.where(state.grab_purpose[hands] == GRASP_BOTH, self.settings.nearness_of_both, 1.0)
         return np.asarray(
-            (away <= self.settings.near) & (2.0 * np.arccos(cosine) <= self.settings.near_angle)
+            (away <= share * self.settings.near)
+            & (2.0 * np.arccos(cosine) <= share * self.settings.near_angle)
         )
 
     def _begin(self, state: State, hands: Hands) -> None:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crowd.controllers.carrying import CARRYING, PLACING
 from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
 from crowd.errors import SettingsError
 from crowd.motion.rotation import conjugate, rotate
@@ -132,7 +133,7 @@ def test_large_things_are_carried_with_both_hands(carriers: Simulation) -> None:
     assert objects.holder_hand.all()
     carriers.commands.end_reach(slice(None))
     advance(carriers, 1.5)
-    assert state.is_carrying.all()
+    assert (state.carry_stage == CARRYING).all()
     carriers.commands.set_locomotion(slice(None), (1.2, 0.3, 0.0))
     places = []
     for _ in range(120):
@@ -153,7 +154,7 @@ def test_a_large_thing_is_put_down_with_both_hands(carriers: Simulation) -> None
     wanted = state.position_world + 0.45 * heading + np.array([0.0, 0.95, 0.0])
     carriers.commands.put(slice(None), wanted)
     advance(carriers, 2.0)
-    assert not state.is_carrying.any()
+    assert (state.carry_stage == PLACING).all()
     assert np.linalg.norm(objects.position_world - wanted, axis=1).max() < 0.01
     carriers.commands.let_go(slice(None))
     advance(carriers, 1.0)
