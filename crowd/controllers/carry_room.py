@@ -8,19 +8,19 @@ from crowd.state import FloatArray
 
 CENTER = 0.75
 """Height of the middle of the room, over stature."""
-FARTHEST, HIGHEST, LOWEST = 0.74, 0.50, 2.0
+FARTHEST, HIGHEST, LOWEST = 0.72, 0.50, 1.6
 """Half axes of the room around that: sideways, up, down, m; the trunk bends down, but not up."""
 WALKING_FARTHEST, WALKING_LOWEST = 0.60, 0.50
 """Likewise of people who walk, whose trunk stays upright."""
 CHEST = 0.63
 """Height of the middle of the chest, over stature."""
-BEFORE_CHEST, AWAY = 0.22, 0.45
+BEFORE_CHEST, AWAY = 0.15, 0.38
 """Heights from there between which the room changes from that before the chest to that below and above, m."""
 NEAREST = 0.22, 0.48
 """Least distance from the body's axis before the chest, and below and above, m."""
 ASIDE = 1.0, 0.4
 """Greatest angle to a side, rad."""
-TURN, TILT = (0.7, 0.3), (0.4, 0.1)
+TURN, TILT = (0.7, 0.25), (0.4, 0.1)
 """Greatest turn about the vertical, and greatest tilt, against how both hands took it, rad."""
 WALKING_TURN = 0.4
 """Share of these angles for people who walk."""

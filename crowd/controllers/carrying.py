@@ -230,7 +230,7 @@ class Carrying:
         carries, stopped = np.isin(stage, (CARRYING, WAITING)), stage == STOPPED
         grip = state.carry_grip_rotation[rows]
         before = np.zeros((rows.size, 3))
-        before[:, 1] = self.settings.height * self._stature[rows]
+        before[:, 1] = self.settings.height * self._stature[rows] - self._rise_of_hands(items, grip)
         before[:, 2] = self.settings.gap * self._size[rows] + self._placement.depths(items, grip)
         position[carries], rotation[carries] = before[carries], grip[carries]
         position[stopped] = state.carry_start_position[rows[stopped]]
@@ -240,6 +240,15 @@ class Carrying:
         lacks = np.linalg.norm(near - position, axis=1) > self.settings.tolerance
         self._lacks[rows] = lacks | (np.linalg.norm(turn, axis=1) > self.settings.angle_tolerance)
         return near, turned
+
+    def _rise_of_hands(self, items: IntArray, rotation: FloatArray) -> FloatArray:
+        """How far the middle between both hands is above the objects' centres, turned so (A, 4), m. (A,)"""
+        center = np.zeros((items.size, 3))
+        hands = [np.full(items.size, hand, np.int32) for hand in (0, 1)]
+        places = [
+            self._holding.hand_targets((items, hand), items, center, rotation)[0][:, 1] for hand in hands
+        ]
+        return np.asarray(0.5 * (places[0] + places[1]))
 
     def _limited(self, state: State, rows: IntArray, frames: Frames) -> Frames:
         """Bring poses in root frames into the room of both hands."""

@@ -16,6 +16,8 @@ from crowd.joints import Joints
 from crowd.model import Model
 from crowd.motion.easing import minimum_jerk
 from crowd.motion.hand import hand_table
+from crowd.motion.rotation import about, rotate
+from crowd.people import HANDING_HEIGHT
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
 from crowd.world.shape_table import shape_table
@@ -26,6 +28,8 @@ from crowd_kernels.hand_pose import pose_hands
 
 OPEN, CLOSING, HOLDING, OPENING = range(4)
 NOTHING, GRASP, TOUCH, GRASP_BOTH, AWAIT = range(5)
+STATURE = 1.75
+"""m."""
 FARTHEST_GAP = 0.05
 """Gaps between fingers and objects are measured up to this, m."""
 
@@ -49,6 +53,14 @@ class GrabStatus(IntEnum):
     """The hand is as near as it gets."""
     GIVEN = 9
     """Another hand has taken the object over; this one opens and returns."""
+    TOO_LATE = 10
+    """The hand has not come to the object for long."""
+    EMPTY = 11
+    """There is nothing in the hand."""
+    TIED = 12
+    """The other hand holds the object too; both move together."""
+    TOO_FAR = 13
+    """The other person is too far away."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +77,10 @@ class GrabSettings:
     """m. A hand this near to its place on the object closes."""
     near_angle: float = 0.045
     """rad. Likewise for its rotation."""
+    patience: float = 8.0
+    """s, > 0. Who stands and has not come to an object for so long gives up."""
+    before_body: float = 0.36
+    """m, at a stature of 1.75 m. How far ahead people bring what they take with the other hand."""
     slip: float = 0.05
     """m. A hand that is farther than this from what it touched touches it no more."""
     nearness_of_both: float = 0.4
@@ -140,6 +156,8 @@ class Grab:
         rows, hands, items = rows[may], hands[may], items[may]
         other = 1 - hands
         together = (state.grab_object[rows, other] == items) & (state.grab_stage[rows, other] == OPEN)
+        together &= state.grab_purpose[rows, other] != TOUCH
+        self._bring_before_body(state, (rows, other), items)
         moves = ~together & self._is_brought(state, rows, items)
         state.grab_object[rows[moves], hands[moves]] = items[moves]
         state.grab_purpose[rows[moves], hands[moves]] = AWAIT
@@ -149,8 +167,20 @@ class Grab:
 
     def grasp_both(self, state: State, characters: IntArray, item: npt.ArrayLike) -> None:
         """Let both hands go to opposite sides of objects and hold them together; see `grasp`."""
-        for hand in (0, 1):
-            self.grasp(state, characters, hand, item)
+        rows, right, items = _listed(characters, 0, item)
+        reasons = [self._reason_against(state, (rows, hand), items) for hand in (right, right + 1)]
+        against = np.where(reasons[0] == GrabStatus.NONE, reasons[1], reasons[0])
+        for hand, reason in zip((right, right + 1), reasons, strict=True):
+            has = reason != GrabStatus.NONE
+            self._turn_down(state, (rows[has], hand[has]), reason[has])
+        may = against == GrabStatus.NONE
+        self._grasp_together(state, rows[may], items[may])
+
+    def is_too_big(
+        self, state: State, characters: IntArray, hand: npt.ArrayLike, item: npt.ArrayLike
+    ) -> BoolArray:
+        """Tell which objects single hands cannot hold; arguments as in `grasp`. (M,)"""
+        return np.asarray(self.placement.of_one_hand(state, *_listed(characters, hand, item))[3] == TOO_BIG)
 
     def touch(self, state: State, characters: IntArray, hand: npt.ArrayLike, item: npt.ArrayLike) -> None:
         """Let hands go to objects and lie on them without closing; arguments as in `grasp`."""
@@ -212,14 +242,16 @@ class Grab:
         ----------
         state : State
         characters : (M,) int32
-            Each once; those whose hand holds nothing are left out.
+            Each once; those whose hand holds nothing are refused. What both hands hold goes with both.
         hand : int or (M,) int
         position_world : (3,) or (M, 3) array
             Centre of the object, m.
         rotation_world : (4,) or (M, 4) array
         """
         rows, hands, _ = _listed(characters, hand, 0)
-        holds = state.grab_stage[rows, hands] == HOLDING
+        holds = np.isin(state.grab_stage[rows, hands], (CLOSING, HOLDING))
+        empty = rows[~holds], hands[~holds]
+        self._turn_down(state, empty, np.full(empty[0].size, GrabStatus.EMPTY, np.uint8))
         place = np.broadcast_to(np.asarray(position_world, np.float64), (rows.size, 3))[holds]
         turn = np.broadcast_to(np.asarray(rotation_world, np.float64), (rows.size, 4))[holds]
         at = rows[holds], hands[holds]
@@ -310,6 +342,7 @@ class Grab:
             awaits[awaits] = ~self._is_brought(state, rows[awaits], state.grab_object[rows, hands][awaits])
             self._grasp_alone(state, (rows[awaits], hands[awaits]), state.grab_object[rows, hands][awaits])
             self._arrive(state, (rows[waits], hands[waits]))
+            self._lose_patience(state, (rows[waits], hands[waits]), step.dt)
         self.holding.follow(state)
         touches = state.grab_status[rows, hands] == GrabStatus.TOUCHING
         if touches.any():
@@ -323,33 +356,77 @@ class Grab:
     def _accept(self, state: State, hands: Hands, items: IntArray, holds: bool = True) -> BoolArray:
         """Sort out hands that cannot go to their objects, and say why."""
         rows, side = hands
+        reason = self._reason_against(state, hands, items, holds)
+        other = 1 - side
+        goes_on = (state.grab_object[rows, side] >= 0) & (state.grab_object[rows, other] != items)
+        goes_on &= (reason == GrabStatus.NONE) & (state.grab_stage[rows, side] == OPEN)
+        if holds and goes_on.any():
+            big = self.is_too_big(state, rows[goes_on], side[goes_on], items[goes_on])
+            reason[np.flatnonzero(goes_on)[big]] = GrabStatus.TOO_BIG
+        may = reason == GrabStatus.NONE
+        has = (rows[~may], side[~may])
+        self._turn_down(state, has, reason[~may])
+        state.grab_status[rows[may], side[may]] = GrabStatus.APPROACHING
+        state.grab_time[rows[may], side[may]] = 0.0
+        if holds and may.any():
+            state.grab_giver[rows[may], side[may]] = self.objects.holder[items[may]]
+        return np.asarray(may)
+
+    def _reason_against(
+        self, state: State, hands: Hands, items: IntArray, holds: bool = True
+    ) -> npt.NDArray[np.uint8]:
+        """Why hands cannot go to objects: `GrabStatus.NONE` where they can, `HOLDING` where they have it."""
+        rows, side = hands
         objects = self.objects
         exists = (items >= 0) & (items < objects.count)
         known = np.where(exists, items, 0)
         if objects.count:
             exists &= np.isfinite(objects.position_world[known]).all(axis=1)
-        is_free = np.isin(state.grab_stage[rows, side], (OPEN, OPENING))
-        may = exists & is_free
-        self._refuse(state, (rows[is_free & ~exists], side[is_free & ~exists]), GrabStatus.REFUSED)
-        state.grab_status[rows[may], side[may]] = GrabStatus.APPROACHING
-        if not holds or not may.any():
-            return np.asarray(may)
+        reason = np.where(exists, GrabStatus.NONE, GrabStatus.REFUSED).astype(np.uint8)
+        closed = np.isin(state.grab_stage[rows, side], (CLOSING, HOLDING))
+        has_it = closed & exists & (state.grab_object[rows, side] == items)
+        reason[closed] = GrabStatus.REFUSED
+        reason[has_it] = GrabStatus.HOLDING
+        if not holds or not exists.any():
+            return reason
         giver = objects.holder[known]
-        is_others = may & (giver >= 0) & (giver != rows)
+        is_others = exists & (giver >= 0) & (giver != rows)
         offers = ((state.reach_stage[giver] != reach_goal.NONE) & objects.holder_hand[known]).any(axis=1)
-        taken = is_others & ~offers
-        self._refuse(state, (rows[taken], side[taken]), GrabStatus.TAKEN)
-        state.grab_giver[rows, side] = np.where(may, giver, -1)
-        return np.asarray(may & ~taken)
+        reason[is_others & ~offers & ~closed] = GrabStatus.TAKEN
+        return reason
+
+    def _turn_down(self, state: State, hands: Hands, reason: npt.NDArray[np.uint8]) -> None:
+        """Refuse what hands are asked for; what they are at goes on. `HOLDING` needs no refusal."""
+        new = reason != GrabStatus.HOLDING
+        rows, side, reason = hands[0][new], hands[1][new], reason[new]
+        state.grab_refusal[rows, side] = reason
+        state.grab_refusals[rows, side] += 1
+        idle = state.grab_object[rows, side] < 0
+        state.grab_status[rows[idle], side[idle]] = reason[idle]
 
     def _is_brought(self, state: State, rows: IntArray, items: IntArray) -> BoolArray:
-        """Which objects others are still bringing to where they hold them out."""
+        """Which objects others, or other hands, are still bringing to where they hold them out."""
         holder = self.objects.holder[items]
         moves = (state.reach_stage[holder] == reach_goal.MOVE) & self.objects.holder_hand[items]
-        return np.asarray((holder >= 0) & (holder != rows) & moves.any(axis=1))
+        return np.asarray((holder >= 0) & moves.any(axis=1))
+
+    def _bring_before_body(self, state: State, hands: Hands, items: IntArray) -> None:
+        """Let hands that hold objects at the side bring them to where the other hand takes them."""
+        rests = self.holding.held_by(hands, items)
+        rests &= np.isin(state.reach_stage[hands], (reach_goal.NONE, reach_goal.RETURN))
+        rows, side, items = hands[0][rests], hands[1][rests], items[rests]
+        if rows.size == 0:
+            return
+        ahead = np.zeros((rows.size, 3))
+        ahead[:, 1] = HANDING_HEIGHT * self.placement.stature[rows]
+        ahead[:, 2] = self.settings.before_body * self.placement.stature[rows] / STATURE
+        place = state.position_world[rows] + rotate(about(1, state.yaw[rows]), ahead)
+        self.put(state, rows, side, place, self.placement.upright(items))
 
     def _grasp_alone(self, state: State, hands: Hands, items: IntArray) -> None:
         """Choose grips of single hands and send those that are large enough."""
+        if items.size == 0:
+            return
         rows, side = hands
         fits = self._place(state, hands, items, GRASP) != TOO_BIG
         self._send(state, (rows[fits], side[fits]))
@@ -385,6 +462,7 @@ class Grab:
             state.finger_contact[rows, side] = 0
             state.grab_stage[rows, side] = OPEN
             state.grab_giver[rows, side] = self.objects.holder[items]
+            state.grab_time[rows, side] = 0.0
             state.grab_status[rows, side] = GrabStatus.APPROACHING
             self._refuse(state, (rows[~fits], hands[~fits]), GrabStatus.TOO_BIG)
             self._send(state, (rows[fits], hands[fits]))
@@ -429,6 +507,27 @@ class Grab:
             owner = np.unique(items[pair], return_index=True)[1]
             chosen = np.isin(rows, rows[pair][owner]) & pair
             self._begin(state, (rows[chosen], side[chosen]))
+
+    def _lose_patience(self, state: State, hands: Hands, dt: float) -> None:
+        """Let hands give up that have not come to their objects for long while their people stand."""
+        waits = (state.grab_stage[hands] == OPEN) & (state.grab_object[hands] >= 0)
+        waits &= np.isin(state.grab_status[hands], (GrabStatus.APPROACHING, GrabStatus.OUT_OF_REACH))
+        rows, side = hands[0][waits], hands[1][waits]
+        walks = state.locomotion_weight[rows] > 0.0
+        state.grab_time[rows, side] = np.where(walks, 0.0, state.grab_time[rows, side] + dt)
+        late = state.grab_time[rows, side] > self.settings.patience
+        self._give_up(state, (rows[late], side[late]), GrabStatus.TOO_LATE)
+
+    def forget(self, state: State, characters: IntArray, hand: npt.ArrayLike) -> None:
+        """Let hands that are on their way to objects, or touch them, leave them alone."""
+        rows, hands, _ = _listed(characters, hand, 0)
+        goes = (state.grab_stage[rows, hands] == OPEN) & (state.grab_object[rows, hands] >= 0)
+        self._forget(state, (rows[goes], hands[goes]), GrabStatus.NONE)
+
+    def refuse(self, state: State, characters: IntArray, hand: npt.ArrayLike, why: GrabStatus) -> None:
+        """Note that hands do not do what they were asked to; what they are at goes on."""
+        rows, hands, _ = _listed(characters, hand, 0)
+        self._turn_down(state, (rows, hands), np.full(rows.size, why, np.uint8))
 
     def _keep_touching(self, state: State, hands: Hands) -> None:
         """Let hands follow what they have touched, and give up what others carry away."""

@@ -5,7 +5,7 @@ import numpy as np
 from crowd.joints import Joints
 from crowd.model import Model
 from crowd.motion.hand import SIDES
-from crowd.motion.rotation import conjugate, from_axes, rotate
+from crowd.motion.rotation import about, conjugate, from_axes, multiply, rotate, yaw_of
 from crowd.motion.skeleton import Segment
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState, ShapeKind
@@ -24,6 +24,8 @@ DESCENT = 0.35
 """Share of the way down in the direction of the fingers; the hand stays flatter than the arm."""
 APART = 0.3
 """How far the back of a hand leans away from the hand that holds the object already."""
+BELOW, EDGE = 0.09, 0.04
+"""Both hands take what others hold so far below the middle, and keep so far from the edge, m."""
 WIDEST = 0.9
 """Widest thing that two hands hold, m."""
 
@@ -35,12 +37,15 @@ class GripPlacement:
     ----------
     scale : (N,) float64
         Of each character's hands.
+    stature : (N,) float64
+        m.
     """
 
     def __init__(
         self, model: Model, hand: HandTable, shapes: ShapeTable, objects: ObjectState, joints: Joints
     ) -> None:
         self.scale: FloatArray = np.ascontiguousarray(model.people.segment_scale[:, Segment.HAND], np.float64)
+        self.stature = model.people.stature
         self._hand, self._shapes, self._objects, self._joints = hand, shapes, objects, joints
         self._model = model
         names = [[f"{side}_{part}" for side in SIDES] for part in ("upper_arm", "hand")]
@@ -118,7 +123,22 @@ class GripPlacement:
             rotation[:, side] = from_axes(across, -fingers, np.cross(across, -fingers))
             on_palm = back * -hand.palm_depth + fingers * 0.5 * (hand.nearest_grip + hand.farthest_grip)
             position[:, side] = back * (reach + PALM_GAP)[:, None] - scale * on_palm
+        position += self._below_others(rows, items)[:, None]
         return position, rotation, width <= WIDEST
+
+    def _below_others(self, rows: IntArray, items: IntArray) -> FloatArray:
+        """How far below the middle hands take what others hold, in the objects' frames, m. (A, 3)"""
+        objects = self._objects
+        down = rotate(conjugate(objects.rotation_world[items]), np.array([0.0, -1.0, 0.0]))
+        room = np.array([self._support(item, way) for item, way in zip(items, down, strict=True)]) - EDGE
+        is_others = (objects.holder[items] >= 0) & (objects.holder[items] != rows)
+        return np.asarray(down * np.where(is_others, np.clip(room, 0.0, BELOW), 0.0)[:, None])
+
+    def upright(self, items: IntArray) -> FloatArray:
+        """Rotations (A, 4) of objects as they stood at the start, with the headings that they have now."""
+        start = self._model.objects.start_rotation_world[items]
+        heading = yaw_of(multiply(self._objects.rotation_world[items], conjugate(start)))
+        return multiply(about(1, heading), start)
 
     def depths(self, items: IntArray, rotation: FloatArray) -> FloatArray:
         """Reach of objects from their centres backwards when they are turned (A, 4), m. (A,)"""

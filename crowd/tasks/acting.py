@@ -15,7 +15,16 @@ from crowd.motion.rotation import about, conjugate, multiply, yaw_of
 from crowd.people import HANDING_HEIGHT
 from crowd.state import FloatArray
 from crowd.tasks.events import EventKind
-from crowd.tasks.present_task import hands_of, held_object, rows_of, task_of
+from crowd.tasks.present_task import (
+    are_empty,
+    free_hand,
+    hands_of,
+    held_object,
+    holding_hand,
+    rows_of,
+    task_of,
+    wanted_hand,
+)
 from crowd.tasks.task_list import Hand, Target, TaskKind
 from crowd.tasks.waits import Outcome
 from crowd_kernels.reach_goal import NONE
@@ -103,9 +112,11 @@ def look_away(tasks: Tasks, row: int, time: float) -> Outcome:
 
 def grasp(tasks: Tasks, row: int, time: float) -> Outcome:
     """Reach for the object and close the hand around it."""
-    simulation = tasks.simulation
-    for hand in hands_of(tasks, row):
-        simulation.grab.grasp(simulation.state, rows_of(row), hand, int(tasks.object[row]))
+    grab, state, item = tasks.simulation.grab, tasks.simulation.state, int(tasks.object[row])
+    if tasks.hand[row] == Hand.BOTH:
+        grab.grasp_both(state, rows_of(row), item)
+    else:
+        grab.grasp(state, rows_of(row), int(tasks.hand[row]), item)
     return Outcome.WAIT
 
 
@@ -116,7 +127,10 @@ def grasp_offered(tasks: Tasks, row: int, time: float) -> Outcome:
     if item < 0:
         return Outcome.FAIL
     tasks.object[row] = item
-    return grasp(tasks, row, time)
+    if wanted_hand(tasks, row) == Hand.ANY:
+        both = holding_hand(tasks, item) == Hand.BOTH
+        tasks.hand[row] = Hand.BOTH if both else free_hand(tasks, row, item)
+    return grasp(tasks, row, time) if are_empty(tasks, row) else Outcome.HANDS_FULL
 
 
 def lift(tasks: Tasks, row: int, time: float) -> Outcome:
@@ -130,6 +144,7 @@ def lift(tasks: Tasks, row: int, time: float) -> Outcome:
     simulation.tasks.events.add(time, row, EventKind.OBJECT_TAKEN, "pick_up", name)
     for hand in hands_of(tasks, row):
         simulation.reach.end(simulation.state, rows, hand)
+    simulation.commands.stop_play(row)
     if tasks.hand[row] != Hand.BOTH:
         simulation.commands.play(row, CARRYING_CLIPS[tasks.hand[row]], seconds=math.inf)
     return Outcome.WAIT
@@ -139,8 +154,8 @@ def lay(tasks: Tasks, row: int, time: float) -> Outcome:
     """Bring the held object to its place, upright, turned against the body as it is held."""
     simulation = tasks.simulation
     rotation = resting_rotation(tasks, row, int(tasks.object[row]))
-    for hand in hands_of(tasks, row):
-        simulation.grab.put(simulation.state, rows_of(row), hand, tasks.target_world[row], rotation)
+    hand = hands_of(tasks, row)[0]
+    simulation.grab.put(simulation.state, rows_of(row), hand, tasks.target_world[row], rotation)
     simulation.commands.stop_play(row)
     return Outcome.WAIT
 
@@ -201,6 +216,10 @@ def offer(tasks: Tasks, row: int, time: float) -> Outcome:
     point = state.position_world[row] + OFFER_DISTANCE * ahead
     point[1] = HANDING_HEIGHT * float(simulation.model.people.stature[row])
     hand = hands_of(tasks, row)[0]
+    if tasks.hand[row] == Hand.BOTH:
+        turn = simulation.objects.rotation_world[int(tasks.object[row])]
+        simulation.grab.put(state, rows_of(row), hand, point, turn)
+        return Outcome.WAIT
     grip = simulation.objects.grip_position[int(tasks.object[row]), hand]
     simulation.reach.start(state, rows_of(row), hand, point, None, grip)
     simulation.commands.stop_play(row)

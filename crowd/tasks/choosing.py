@@ -13,7 +13,14 @@ import numpy.typing as npt
 
 from crowd.state import FloatArray, IntArray
 from crowd.tasks.partners import missing_half
-from crowd.tasks.present_task import free_hand, held_object, holding_hand, task_of, wanted_hand
+from crowd.tasks.present_task import (
+    are_empty,
+    free_hand,
+    held_object,
+    holding_hand,
+    task_of,
+    wanted_hand,
+)
 from crowd.tasks.standing_place import find_standing_place, is_behind_walls
 from crowd.tasks.task_list import Hand, Target, TaskKind
 from crowd.tasks.waits import Outcome
@@ -34,6 +41,8 @@ CHEST = 0.7
 """Height over stature at which no wall may be between them."""
 SPOT_GAP = 0.16
 """Least distance between things on a board, m."""
+SPOT_ROOM = 0.06
+"""Distance that large things keep from the middles of others, m."""
 NEIGHBORHOOD = 3.0
 """People farther than this from a target do not stand in the way, m."""
 HIGHEST = 1.0
@@ -72,21 +81,48 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     items = _that_are_somewhere(tasks, group)
     if items.size == 0:
         return Outcome.NOWHERE
+    if (outcome := _with_own(tasks, row, items)) is not Outcome.FAIL:
+        return outcome
     is_free = (objects.holder[items] < 0) & ((tasks.claimed_by[items] < 0) | (tasks.claimed_by[items] == row))
     has_taken = not is_free.all()
     items = items[is_free & ~np.isin(items, _delivered(tasks))]
     away = np.linalg.norm(objects.position_world[items] - simulation.state.position_world[row], axis=1)
-    tasks.hand[row] = free_hand(tasks, row)
     is_high = objects.position_world[items, 1] > HIGHEST * simulation.model.people.stature[row]
     nearest = items[np.lexsort((away, is_high))][:MOST_CONSIDERED]
     # What could not be taken from one place may be taken from another; so may its neighbour.
     nearest = np.roll(nearest, -((int(tasks.attempt[row]) + 1) // 2))
-    outcome = _take_first_place(tasks, row, objects.position_world[nearest])
-    if outcome is Outcome.NEXT:
-        item = nearest[(objects.position_world[nearest] == tasks.target_world[row]).all(axis=1)][0]
-        tasks.object[row] = item
-        tasks.claimed_by[item] = row
+    met = set()
+    for item in nearest:
+        tasks.hand[row] = free_hand(tasks, row, int(item))
+        tasks.target_world[row] = objects.position_world[item]
+        outcome = _take_place(tasks, row) if are_empty(tasks, row) else Outcome.HANDS_FULL
+        if outcome is Outcome.NEXT:
+            tasks.object[row] = item
+            tasks.claimed_by[item] = row
+            return outcome
+        met.add(outcome)
+    outcome = met.pop() if len(met) == 1 else Outcome.FAIL
     return Outcome.FAIL if outcome is Outcome.BEHIND_WALLS and has_taken else outcome
+
+
+def _with_own(tasks: Tasks, row: int, items: npt.NDArray[np.intp]) -> Outcome:
+    """What to do with an object of the name that the person holds itself, when no other one is free.
+
+    What is held as wanted needs nothing, and what the other hand holds goes from hand to hand.
+    """
+    objects, wanted = tasks.simulation.objects, wanted_hand(tasks, row)
+    mine = items[objects.holder[items] == row]
+    if mine.size == 0 or (objects.holder[items] < 0).any():
+        return Outcome.FAIL
+    for item in mine:
+        holding = holding_hand(tasks, int(item))
+        if wanted in (Hand.ANY, holding) or holding == Hand.BOTH:
+            tasks.object[row] = item
+            return Outcome.DONE
+    tasks.hand[row], tasks.object[row] = wanted, mine[0]
+    tasks.target_world[row] = objects.position_world[mine[0]]
+    tasks.has_place[row] = False
+    return Outcome.NEXT if wanted != Hand.BOTH and are_empty(tasks, row) else Outcome.HANDS_FULL
 
 
 def _that_are_somewhere(tasks: Tasks, group: int) -> npt.NDArray[np.intp]:
@@ -158,8 +194,14 @@ def _free_spots(tasks: Tasks, row: int, group: int) -> FloatArray:
     taken = np.concatenate(used)
     if len(taken):
         away = np.linalg.norm(spots[:, None, [0, 2]] - taken[None, :, [0, 2]], axis=2)
-        spots = spots[(away > SPOT_GAP).all(axis=1)]
+        spots = spots[(away > _gap_around(tasks, row)).all(axis=1)]
     return np.asarray(spots[_nearest(tasks, row, spots)])
+
+
+def _gap_around(tasks: Tasks, row: int) -> float:
+    """Least distance of other things from the one that the person puts down, m."""
+    half = tasks.simulation.model.objects.half_size[int(tasks.object[row])]
+    return max(SPOT_GAP, SPOT_ROOM + float(half[[0, 2]].max()))
 
 
 def choose_seat(tasks: Tasks, row: int, time: float) -> Outcome:

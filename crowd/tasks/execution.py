@@ -36,6 +36,7 @@ LOOK_AGAIN_AFTER = 1.0
 HOPELESS = {
     Outcome.EMPTY_HANDED: "the hands are empty",
     Outcome.NOWHERE: "the object is nowhere",
+    Outcome.HANDS_FULL: "the hands hold something else",
     Outcome.BEHIND_WALLS: "obstacles are in the way from every place to stand",
 }
 """Why tasks fail without another look."""
@@ -204,6 +205,9 @@ class Tasks:
                 self.wait[row] = move.wait
                 self.since[row] = time
                 self.until[row] = time + move.limit(self, row)
+                return
+            if outcome is Outcome.DONE:
+                self._finish(row, time)
                 return
             may_change = self.simulation.model.timetable.changes_after(time)
             if outcome is Outcome.FAIL or (outcome is Outcome.BEHIND_WALLS and may_change):

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crowd.controllers.grab import GrabStatus
 from crowd.state import FloatArray, IntArray
 from crowd.tasks.task_list import Hand, Target
 
@@ -55,13 +54,19 @@ def holding_hand(tasks: Tasks, item: int) -> int:
     return Hand.BOTH if right and left else Hand.LEFT if left else Hand.RIGHT
 
 
-def free_hand(tasks: Tasks, row: int) -> int:
-    """The hand that the task asks for; without a wish both for what was too big, or one that is empty."""
+def free_hand(tasks: Tasks, row: int, item: int = -1) -> int:
+    """The hand that the task asks for; without a wish both for what is too big for one, or an empty one."""
     wanted = wanted_hand(tasks, row)
     if wanted != Hand.ANY:
         return wanted
-    if (tasks.simulation.state.grab_status[row] == GrabStatus.TOO_BIG).any():
-        return Hand.BOTH
     objects = tasks.simulation.objects
     mine = objects.holder == row
-    return Hand.LEFT if (objects.holder_hand[mine, 0]).any() else Hand.RIGHT
+    hand = Hand.LEFT if (objects.holder_hand[mine, 0]).any() else Hand.RIGHT
+    if item >= 0 and tasks.simulation.grab.is_too_big(tasks.simulation.state, rows_of(row), hand, item)[0]:
+        return Hand.BOTH
+    return hand
+
+
+def are_empty(tasks: Tasks, row: int) -> bool:
+    """The hands that do the present task hold nothing."""
+    return all(held_object(tasks, row, hand) < 0 for hand in hands_of(tasks, row))

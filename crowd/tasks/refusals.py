@@ -20,6 +20,10 @@ REASONS = {
     GrabStatus.TAKEN: "somebody else holds the object",
     GrabStatus.TOO_BIG: "the object is too big for one hand",
     GrabStatus.MISSED: "the fingers met nothing",
+    GrabStatus.TOO_LATE: "the hand has not come to the object for long",
+    GrabStatus.EMPTY: "there is nothing in the hand",
+    GrabStatus.TIED: "the other hand holds the object too",
+    GrabStatus.TOO_FAR: "the other person is too far away",
 }
 """What the refusals of grasps mean."""
 

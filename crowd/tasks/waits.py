@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from crowd.controllers.carrying import CARRYING
 from crowd.controllers.controller import Step
 from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
 from crowd.state import BoolArray, IntArray
@@ -20,7 +21,13 @@ if TYPE_CHECKING:
 
 MEETING_NEAR = 1.6
 """Distance at which two people have met, m."""
-HOPELESS = (GrabStatus.REFUSED, GrabStatus.TAKEN, GrabStatus.TOO_BIG, GrabStatus.MISSED)
+HOPELESS = (
+    GrabStatus.REFUSED,
+    GrabStatus.TAKEN,
+    GrabStatus.TOO_BIG,
+    GrabStatus.MISSED,
+    GrabStatus.TOO_LATE,
+)
 """Statuses of a grasp that waiting does not change."""
 LONG_ENOUGH = 2.5
 """Time after which a hand that has not come to its target will not do so, s."""
@@ -43,6 +50,10 @@ class Outcome(Enum):
     """The other person has no task for it."""
     NOWHERE = 6
     """The object has no place."""
+    HANDS_FULL = 7
+    """The hands that are to do it hold something else."""
+    DONE = 8
+    """It is so already."""
 
 
 class Wait(IntEnum):
@@ -114,11 +125,16 @@ def _has(wait: Wait, tasks: Tasks, step: Step, rows: IntArray) -> BoolArray:
             touches = state.grab_status[rows] == GrabStatus.TOUCHING
             return _all_hands(touches | (state.reach_status[rows] == REACHED), hands)
         case Wait.HOLDING:
-            return _all_hands(state.grab_stage[rows] == HOLDING, hands)
+            holds = (state.grab_stage[rows] == HOLDING) & (
+                state.grab_object[rows] == tasks.object[rows, None]
+            )
+            return _all_hands(holds, hands)
         case Wait.OPEN:
             return _all_hands(state.grab_stage[rows] == OPEN, hands)
         case Wait.WITHDRAWN:
-            return _all_hands(state.reach_stage[rows] == NONE, hands)
+            # What both hands hold is before the body then, and the hands at it.
+            carries = (state.carry_stage[rows] == CARRYING) & (state.carry_progress[rows] >= 1.0)
+            return np.asarray(_all_hands(state.reach_stage[rows] == NONE, hands) | carries)
         case Wait.SEATED:
             return state.sitting_time[rows] >= simulation.sitting.seconds(step)
         case Wait.RISEN:
