@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.arguments import rotations_of, vectors
-from crowd.controllers.grab import GrabStatus
+from crowd.controllers.carrying import FREE
+from crowd.controllers.grab import CLOSING, HOLDING, GrabStatus
 from crowd.errors import SettingsError, describe
 from crowd.motion.clip import ClipKind
-from crowd.motion.rotation import about, conjugate, multiply, yaw_of
 from crowd.people import HANDING_HEIGHT
 from crowd.scenario.task_table import TaskTable
 from crowd.tasks.execution import encode_tasks
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
 HANDS = ("right", "left")
+BOTH = "both"
+FARTHEST_HANDING = 1.6
+"""Distance of people up to which one hands something over to the other, m."""
 Characters = int | slice | Sequence[int] | npt.NDArray[np.integer]
 
 
@@ -180,7 +183,7 @@ class Commands:
             points = vectors("look_at", "point", point_world, rows.size, must_be_finite=False)
             gaze.look_at_point(state, rows, points, trunk)
         elif character is not None:
-            others = self._rows(np.atleast_1d(np.asarray(character)))
+            others = self._rows(np.atleast_1d(np.asarray(character)), must_be_there=False)
             self._require_one_or_all("look_at", "characters", others.size, rows.size)
             gaze.look_at_character(state, rows, others, trunk)
         else:
@@ -223,8 +226,9 @@ class Commands:
         characters : int, slice or sequence of int
         target_world : (3,) or (M, 3) array
             Where the wrist shall come, m.
-        hand : {"right", "left"}, optional
-            The hand on the target's side when left out.
+        hand : {"right", "left", "both"}, optional
+            The hand on the target's side when left out. One that is on its way to an object leaves that
+            alone; one that holds an object together with the other hand is refused, see `put`.
         rotation_world : (4,) or (M, 4) array, optional
             Rotation (w, x, y, z) of the hand joint.
         seconds : float, optional
@@ -248,15 +252,25 @@ class Commands:
             rotations = vectors("reach", "rotation", rotation_world, rows.size, (4,), must_be_finite=False)
             length = np.linalg.norm(rotations, axis=-1, keepdims=True)
             rotations = rotations / np.where(length > 0.0, length, 1.0)
-        hands = self._hands("reach", rows, hand, targets)
-        simulation.reach.start(simulation.state, rows, hands, targets, rotations, seconds=seconds, hold=hold)
+        for side in self._sides("reach", rows, hand, targets):
+            may = self._lets_reach(rows, side)
+            own = None if rotations is None else np.broadcast_to(rotations, (rows.size, 4))[may]
+            places = np.broadcast_to(targets, (rows.size, 3))[may]
+            simulation.grab.forget(simulation.state, rows[may], side[may])
+            simulation.reach.start(
+                simulation.state, rows[may], side[may], places, own, seconds=seconds, hold=hold
+            )
 
     def end_reach(self, characters: Characters, hand: str | None = None) -> None:
-        """Let hands of characters return to rest; both when none is named."""
+        """Let hands of characters return to rest, "right", "left" or "both"; both when none is named.
+
+        Hands that are on their way to an object leave it alone. What both hands hold is then carried before
+        the body.
+        """
         rows, simulation = self._rows(characters), self._simulation
-        names = HANDS if hand is None else (hand,)
-        for name in names:
-            simulation.reach.end(simulation.state, rows, self._hand("end_reach", name))
+        for side in self._named_sides("end_reach", hand):
+            simulation.grab.forget(simulation.state, rows, side)
+            simulation.reach.end(simulation.state, rows, side)
 
     def grasp(self, characters: Characters, item: int | str, hand: str | None = None) -> None:
         """Let characters reach for an object, close a hand around it and hold it, until `let_go`.
@@ -279,55 +293,60 @@ class Commands:
         """
         rows, index, simulation = self._rows(characters), self._item("grasp", item), self._simulation
         state, grab = simulation.state, simulation.grab
-        if hand == "both":
+        sides = self._sides("grasp", rows, hand, simulation.objects.position_world[index])
+        if len(sides) > 1:
             grab.grasp_both(state, rows, index)
             return
-        hands = self._hands("grasp", rows, hand, simulation.objects.position_world[index])
-        grab.grasp(state, rows, hands, index)
-        if hand is None:
-            too_big = state.grab_status[rows, hands] == GrabStatus.TOO_BIG
-            grab.grasp(state, rows[too_big], 1 - hands[too_big], index)
+        both = grab.is_too_big(state, rows, sides[0], index) & (hand is None)
+        grab.grasp_both(state, rows[both], index)
+        grab.grasp(state, rows[~both], sides[0][~both], index)
 
     def touch(self, characters: Characters, item: int | str, hand: str | None = None) -> None:
         """Let characters lay a hand on an object until `let_go`; arguments as in `grasp`."""
         rows, index, simulation = self._rows(characters), self._item("touch", item), self._simulation
-        if hand == "both":
-            for side in range(len(HANDS)):
-                simulation.grab.touch(simulation.state, rows, side, index)
-            return
-        hands = self._hands("touch", rows, hand, simulation.objects.position_world[index])
-        simulation.grab.touch(simulation.state, rows, hands, index)
+        for side in self._sides("touch", rows, hand, simulation.objects.position_world[index]):
+            simulation.grab.touch(simulation.state, rows, side, index)
 
     def put(
         self,
         characters: Characters,
         position_world: npt.ArrayLike,
         rotation_world: npt.ArrayLike | None = None,
+        hand: str | None = None,
     ) -> None:
         """Let characters bring what they hold to a place; `let_go` then leaves it there.
 
         Parameters
         ----------
         characters : int, slice or sequence of int
-            Those who hold nothing are left out.
+            Those who hold nothing are refused.
         position_world : (3,) or (M, 3) array
             Centre of the object, m.
         rotation_world : (4,) or (M, 4) array, optional
             Its rotation (w, x, y, z); as it is now when left out.
+        hand : {"right", "left", "both"}, optional
+            Hand that holds the object; needed where each hand holds another one.
 
         Raises
         ------
         SettingsError
-            A position or rotation is of the wrong shape or not finite.
+            A position or rotation is of the wrong shape or not finite, there is no such hand, or each hand
+            holds something and none is named.
         """
         rows, simulation = self._rows(characters), self._simulation
         state, objects = simulation.state, simulation.objects
         place = vectors("put", "position", position_world, rows.size)
         wanted = None if rotation_world is None else rotations_of("put", rotation_world, rows.size)
-        for side in range(len(HANDS)):
-            items = np.maximum(state.grab_object[rows, side], 0)
-            turn = objects.rotation_world[items] if objects.count else np.zeros((rows.size, 4))
-            simulation.grab.put(state, rows, side, place, turn if wanted is None else wanted)
+        self._named_sides("put", hand)
+        self._require_one_thing("put", rows, hand)
+        # One hand speaks for both where they hold the same.
+        held = self._held(rows)
+        only_left = (held[:, 0] < 0) & (held[:, 1] >= 0)
+        side = np.full(rows.size, HANDS.index(hand)) if hand in HANDS else only_left.astype(np.int64)
+        turn = np.tile([1.0, 0.0, 0.0, 0.0], (rows.size, 1))
+        if objects.count:
+            turn = objects.rotation_world[np.maximum(state.grab_object[rows, side], 0)]
+        simulation.grab.put(state, rows, side, place, turn if wanted is None else wanted)
 
     def let_go(
         self,
@@ -341,7 +360,7 @@ class Commands:
         Parameters
         ----------
         characters : int, slice or sequence of int
-        hand : {"right", "left"}, optional
+        hand : {"right", "left", "both"}, optional
             Both when left out.
         position_world, rotation_world : (3,) or (M, 3), and (4,) or (M, 4) array, optional
             Where the object was to be put, m: taken over exactly where it is within a centimetre of it.
@@ -349,18 +368,24 @@ class Commands:
         Raises
         ------
         SettingsError
-            A position or rotation is of the wrong shape or not finite, or there is no such hand.
+            A position or rotation is of the wrong shape or not finite, there is no such hand, or a position
+            is given for two things.
         """
         rows, simulation = self._rows(characters), self._simulation
         place = None if position_world is None else vectors("let_go", "position", position_world, rows.size)
         turn = None if rotation_world is None else rotations_of("let_go", rotation_world, rows.size)
-        for name in HANDS if hand is None else (hand,):
-            side = self._hand("let_go", name)
+        sides = self._named_sides("let_go", hand)
+        if place is not None:
+            self._require_one_thing("let_go", rows, hand)
+        for side in sides:
             simulation.grab.release(simulation.state, rows, side, place, turn)
             simulation.reach.end(simulation.state, rows, side)
 
     def hand_over(self, giver: int, taker: int) -> None:
-        """Let a character hold out what a hand of it holds, and another one, who stands before it, take it.
+        """Let a character hold out what it holds, and another one, who stands before it, take it.
+
+        What both hands hold is given with both hands and taken with both. Who is giver and taker gives it
+        from one hand to the other. People who are too far apart are refused.
 
         Raises
         ------
@@ -368,20 +393,25 @@ class Commands:
             The giver holds nothing, or one of them is nobody.
         """
         simulation = self._simulation
-        state, objects = simulation.state, simulation.objects
+        state, objects, grab = simulation.state, simulation.objects, simulation.grab
         both = self._rows([giver, taker])
         held = np.flatnonzero(objects.holder == giver)
         if held.size == 0:
             raise SettingsError(describe("hand_over", "the giver holds nothing", giver))
         item = int(held[0])
+        side = int(np.argmax(objects.holder_hand[item]))
+        with_both = bool(objects.holder_hand[item].all())
+        if giver == taker:
+            grab.grasp(state, both[:1], 1 - side, item)
+            return
+        if np.linalg.norm(np.subtract(*state.position_world[both])) > FARTHEST_HANDING:
+            grab.refuse(state, both[:1], side, GrabStatus.TOO_FAR)
+            return
         place = state.position_world[both].mean(axis=0)
         place[1] = HANDING_HEIGHT * float(simulation.model.people.stature[both].mean())
-        side = int(np.argmax(objects.holder_hand[item]))
         # Upright as it stood at the start, turned about the vertical as it is now.
-        start = simulation.model.objects.start_rotation_world[item]
-        heading = yaw_of(multiply(objects.rotation_world[item], conjugate(start)))
-        simulation.grab.put(state, both[:1], side, place, multiply(about(1, heading), start))
-        self.grasp(taker, item, HANDS[side])
+        grab.put(state, both[:1], side, place, grab.placement.upright(held[:1].astype(np.int32)))
+        self.grasp(taker, item, BOTH if with_both else HANDS[side])
 
     def _item(self, what: str, item: int | str) -> int:
         objects = self._simulation.model.objects
@@ -392,21 +422,48 @@ class Commands:
             raise SettingsError(describe(what, "no such object", item, allowed))
         return item
 
-    def _hands(
+    def _sides(
         self, what: str, rows: npt.NDArray[np.int32], hand: str | None, targets: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.int64]:
-        """Hand of each character: the named one, or that on the side of its target."""
+    ) -> list[npt.NDArray[np.int64]]:
+        """Hands of each character, one after the other: those named, or that on the side of its target."""
         if hand is not None:
-            return np.full(rows.size, self._hand(what, hand))
+            return [np.full(rows.size, side) for side in self._named_sides(what, hand)]
         state = self._simulation.state
         away = targets - state.position_world[rows]
         to_left = np.cos(state.yaw[rows]) * away[:, 0] - np.sin(state.yaw[rows]) * away[:, 2]
-        return (to_left > 0.0).astype(np.int64)
+        return [(to_left > 0.0).astype(np.int64)]
+
+    def _named_sides(self, what: str, hand: str | None) -> tuple[int, ...]:
+        """Hands of a name; both when none is given."""
+        return (0, 1) if hand in (None, BOTH) else (self._hand(what, str(hand)),)
 
     def _hand(self, what: str, hand: str) -> int:
         if hand not in HANDS:
-            raise SettingsError(describe(what, "unknown hand", hand, " or ".join(HANDS)))
+            raise SettingsError(describe(what, "unknown hand", hand, f"{', '.join(HANDS)} or {BOTH}"))
         return HANDS.index(hand)
+
+    def _lets_reach(self, rows: npt.NDArray[np.int32], side: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+        """Whose hands can reach by themselves; those that hold something with the other hand are refused."""
+        simulation = self._simulation
+        is_tied = simulation.state.carry_stage[rows] != FREE
+        simulation.grab.refuse(simulation.state, rows[is_tied], side[is_tied], GrabStatus.TIED)
+        return np.asarray(~is_tied)
+
+    def _held(self, rows: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+        """What the right and the left hands hold, (M, 2); -1 for nothing."""
+        state = self._simulation.state
+        closed = np.isin(state.grab_stage[rows], (CLOSING, HOLDING))
+        return np.asarray(np.where(closed, state.grab_object[rows], -1))
+
+    def _require_one_thing(self, what: str, rows: npt.NDArray[np.int32], hand: str | None) -> None:
+        """Check that a place is not asked for the two things in somebody's hands."""
+        held = self._held(rows)
+        has_two = (held >= 0).all(axis=1) & (held[:, 0] != held[:, 1])
+        if hand not in HANDS and has_two.any():
+            row = int(rows[np.argmax(has_two)])
+            raise SettingsError(
+                describe(what, f"each hand of character {row} holds something", hand, " or ".join(HANDS))
+            )
 
     def do(self, characters: Characters, tasks: Sequence[Mapping[str, Any] | TaskTable]) -> None:
         """Let characters do tasks after those they have, one thing after the other.
@@ -443,12 +500,17 @@ class Commands:
                 describe(what, f"wrong number of {targets} to look at", count, f"1 or {characters}")
             )
 
-    def _rows(self, characters: Characters) -> npt.NDArray[np.int32]:
+    def _rows(self, characters: Characters, must_be_there: bool = True) -> npt.NDArray[np.int32]:
         capacity = self._simulation.state.capacity
         if isinstance(characters, slice):
             return np.arange(capacity, dtype=np.int32)[characters]
         rows = np.atleast_1d(np.asarray(characters))
         if rows.dtype == np.bool_:
+            if rows.shape != (capacity,):
+                allowed = f"one value for each of {capacity}"
+                raise SettingsError(
+                    describe("characters", "mask has the wrong length", int(rows.size), allowed)
+                )
             rows = np.flatnonzero(rows)
         if rows.size and not np.issubdtype(rows.dtype, np.integer):
             allowed = f"whole numbers, 0 to {capacity - 1}"
@@ -456,4 +518,10 @@ class Commands:
         if rows.size and (rows.min() < 0 or rows.max() >= capacity):
             wrong = int(rows[(rows < 0) | (rows >= capacity)][0])
             raise SettingsError(describe("characters", "no such row", wrong, f"0 to {capacity - 1}"))
+        is_gone = ~self._simulation.state.is_active[rows.astype(np.int32)]
+        if must_be_there and is_gone.any():
+            present = int(self._simulation.state.is_active.sum())
+            raise SettingsError(
+                describe("characters", "this one is not there", int(rows[is_gone][0]), f"{present} others")
+            )
         return rows.astype(np.int32)

@@ -44,6 +44,8 @@ class CarryingSettings:
     """m. An object at this distance is where it shall be."""
     angle_tolerance: float = 0.0174533
     """rad. Likewise for its rotation."""
+    sway: float = 1e-4
+    """m. Hands that have just taken an object follow smaller motions of it in a step at once."""
 
 
 class Carrying:
@@ -304,9 +306,10 @@ class Carrying:
         """
         away = state.reach_target_world[rows, hand] - state.position_world[rows]
         target = rotate(about(1, -state.yaw[rows]), away)
-        state.reach_offset[rows[~moves], hand] -= (target - state.reach_seen[rows, hand])[~moves]
-        came = rows[~moves & (state.reach_time_left[rows, hand] == 0.0)]
-        came = came[(state.reach_offset[came, hand] != 0.0).any(axis=1)]
+        shift = target - state.reach_seen[rows, hand]
+        lacks = ~moves & (np.linalg.norm(shift, axis=1) > self.settings.sway)
+        state.reach_offset[rows[lacks], hand] -= shift[lacks]
+        came = rows[lacks & (state.reach_time_left[rows, hand] == 0.0)]
         state.reach_bulge[came, hand] = 0.0
         state.reach_time_left[came, hand] = state.reach_plan_time[came, hand] = REACH_LIMITS.least_time
         state.reach_seen[rows, hand] = target

@@ -10,7 +10,7 @@ from crowd.motion.rotation import conjugate, multiply, rotate
 from crowd.scenario.load import scenario_from
 from crowd.scenario.source import ScenarioSource
 from crowd.simulation import Simulation
-from crowd_kernels import _jit
+from crowd_kernels import _jit, reach_goal
 
 BALL, ROD, CARTON, GONE = range(4)
 OBJECTS = [
@@ -170,21 +170,24 @@ def test_a_touch_does_not_close_the_hand(run: Simulation) -> None:
 def test_from_one_hand_to_the_other(run: Simulation) -> None:
     holding(run)
     state, objects = run.state, run.objects
+    run.commands.end_reach(0)
+    advance(run, 1.5)
+    assert (state.reach_stage[0] == reach_goal.NONE).all(), "the left hand hangs at the side"
     run.grab.grasp(state, rows(0), 0, BALL)
     assert state.grab_status[0, 0] == GrabStatus.APPROACHING
-    state.grab_position[0, 0], state.grab_rotation[0, 0] = relative_hand(run, 0, 0, BALL)
-    for _ in range(40):
-        run.step()
-        if state.grab_stage[0, 0] == OPEN:
-            state.grab_position[0, 0], state.grab_rotation[0, 0] = relative_hand(run, 0, 0, BALL)
-    assert objects.holder[BALL] == 0 or state.grab_status[0, 0] == GrabStatus.MISSED
+    assert state.reach_stage[0].tolist() == [reach_goal.NONE, reach_goal.MOVE], (
+        "the left hand brings the ball before the body first"
+    )
+    advance(run, 3.5)
+    assert objects.holder[BALL] == 0
+    assert objects.holder_hand[BALL].tolist() == [True, False]
+    assert state.grab_stage[0].tolist() == [HOLDING, OPEN]
+    assert state.grab_status[0].tolist() == [GrabStatus.HOLDING, GrabStatus.NONE]
 
 
-def relative_hand(simulation: Simulation, character: int, hand: int, item: int) -> Any:
-    """Hand joint in the object's frame."""
-    place, turn = hand_frame(simulation, character, hand)
-    back = conjugate(simulation.objects.rotation_world[item])
-    return rotate(back, place - simulation.objects.position_world[item]), multiply(back, turn)
+def advance(simulation: Simulation, seconds: float) -> None:
+    for _ in range(round(seconds / simulation.dt)):
+        simulation.step()
 
 
 def test_what_another_holds_is_refused_unless_it_is_offered(run: Simulation) -> None:
@@ -235,6 +238,49 @@ def test_a_hand_that_holds_something_takes_nothing_else(run: Simulation) -> None
     run.grab.grasp(run.state, rows(0), 1, ROD)
     assert run.state.grab_object[0, 1] == BALL
     assert run.state.grab_status[0, 1] == GrabStatus.HOLDING
+
+
+def test_a_refused_grasp_leaves_the_one_before_it(run: Simulation) -> None:
+    state = run.state
+    run.grab.grasp(state, rows(0), 1, BALL)
+    advance(run, 0.2)
+    told = run.events.count
+    for act, item in ((run.grab.grasp, 99), (run.grab.touch, 99), (run.grab.grasp, CARTON)):
+        act(state, rows(0), 1, item)
+        run.step()
+        told += 1
+        assert run.events.count == told
+        assert state.grab_status[0, 1] == GrabStatus.APPROACHING
+        assert state.grab_object[0, 1] == BALL
+    advance(run, 2.0)
+    assert state.grab_stage[0, 1] == HOLDING
+    run.grab.grasp(state, rows(0), 1, ROD)
+    run.grab.put(state, rows(0), 0, (0.0, 1.0, 0.4), (1.0, 0.0, 0.0, 0.0))
+    run.step()
+    assert [event.detail for event in run.events][-2:] == [
+        "there is nothing in the hand",
+        "there is no such object, or the hand holds something else",
+    ]
+    assert state.grab_status[0].tolist() == [GrabStatus.EMPTY, GrabStatus.HOLDING]
+
+
+def test_what_is_put_while_the_hand_closes_goes_there(run: Simulation) -> None:
+    run.grab.grasp(run.state, rows(0), 1, BALL)
+    while run.state.grab_stage[0, 1] != CLOSING:
+        run.step()
+    run.grab.put(run.state, rows(0), 1, (0.2, 1.2, 0.4), (1.0, 0.0, 0.0, 0.0))
+    advance(run, 2.0)
+    assert np.linalg.norm(run.objects.position_world[BALL] - [0.2, 1.2, 0.4]) < 0.002
+
+
+def test_who_does_not_come_to_an_object_gives_up(run: Simulation) -> None:
+    run.objects.position_world[BALL] = 0.0, 1.0, 4.0
+    run.grab.grasp(run.state, rows(0), 1, BALL)
+    advance(run, 7.5)
+    assert run.state.grab_status[0, 1] == GrabStatus.OUT_OF_REACH
+    advance(run, 1.0)
+    assert run.state.grab_status[0, 1] == GrabStatus.TOO_LATE
+    assert [event.detail for event in run.events] == ["the hand has not come to the object for long"]
 
 
 def test_a_large_object_goes_between_both_palms(run: Simulation) -> None:

@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crowd.controllers.carrying import CARRYING, PLACING
+from crowd.controllers.carrying import CARRYING, FREE, PLACING, WAITING
 from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
 from crowd.errors import SettingsError
 from crowd.motion.rotation import conjugate, rotate
 from crowd.scenario.load import scenario_from
 from crowd.scenario.source import ScenarioSource
 from crowd.simulation import Simulation
+from crowd_kernels.reach_goal import MOVING, NONE, OUT_OF_REACH, REACHED, REFUSED
 
 THINGS = [
     {"name": "ball", "shape": "sphere", "radius": 0.04, "position": [-0.25, 1.0, 0.45]},
@@ -30,11 +31,14 @@ BALLOON = {"name": "balloon", "shape": "sphere", "radius": 0.13, "position": [3,
 CUP = {"name": "cup", "shape": "capsule", "radius": 0.035, "length": 0.14, "position": [-0.2, 1.0, 0.45]}
 
 
-def simulation_of(objects: Any, people: Any, dt: float = 1 / 60) -> Simulation:
+def simulation_of(objects: Any, people: Any, dt: float = 1 / 60, walls: Any = ()) -> Simulation:
     scenario = scenario_from(
         {
             "dt": dt,
-            "world": {"bounds": {"x": [-10, 30], "z": [-20, 20]}},
+            "world": {
+                "bounds": {"x": [-10, 30], "z": [-20, 20]},
+                "walls": [{"points": points} for points in walls],
+            },
             "characters": [
                 {"position": [x, z], "facing": facing, "height": height, "glances": False}
                 for x, z, facing, height in people
@@ -160,6 +164,156 @@ def test_a_large_thing_is_put_down_with_both_hands(carriers: Simulation) -> None
     advance(carriers, 1.0)
     assert (objects.holder == -1).all()
     assert np.linalg.norm(objects.position_world - wanted, axis=1).max() < 0.01
+
+
+def two_handed(dt: float = 1 / 60, walls: Any = (), people: Any = ((0, 0, 0, 1.75),)) -> Simulation:
+    """A person with a carton between both hands, and others."""
+    simulation = simulation_of([CARTON], people, dt, walls)
+    simulation.commands.grasp(0, "carton")
+    advance(simulation, 2.0)
+    assert (simulation.state.grab_stage[0] == HOLDING).all()
+    return simulation
+
+
+def worst_apart(simulation: Simulation, seconds: float) -> float:
+    """Greatest distance of a hand from what it holds in the next steps, m."""
+    worst = 0.0
+    for _ in range(round(seconds / simulation.dt)):
+        simulation.step()
+        if simulation.objects.holder[0] >= 0:
+            worst = max(worst, apart(simulation, 0))
+    return worst
+
+
+@pytest.mark.parametrize("hertz", [30, 60, 120])
+def test_both_hands_stay_at_what_they_move(hertz: int) -> None:
+    simulation = two_handed(1 / hertz)
+    commands, state = simulation.commands, simulation.state
+    upright, turned = (1.0, 0.0, 0.0, 0.0), (np.cos(0.3), 0.0, np.sin(0.3), 0.0)
+    worst = []
+    for place, turn in (((0.1, 1.0, 0.6), None), ((0.0, 1.2, 0.45), turned), ((-0.2, 0.9, 0.5), upright)):
+        commands.put(0, place, turn)
+        worst.append(worst_apart(simulation, 0.5))
+        assert (state.reach_status[0] == MOVING).all()
+        worst.append(worst_apart(simulation, 1.5))
+        assert (state.reach_status[0] == REACHED).all()
+        assert np.linalg.norm(simulation.objects.position_world[0] - place) < 1e-3
+    commands.end_reach(0)
+    worst.append(worst_apart(simulation, 1.5))
+    commands.set_locomotion(0, (1.2, 0.6, 0.0))
+    worst.append(worst_apart(simulation, 1.5))
+    commands.set_locomotion(0, (0.0, 0.0, 0.0))
+    worst.append(worst_apart(simulation, 1.0))
+    ahead = 0.5 * np.array([np.sin(state.yaw[0]), 2.0, np.cos(state.yaw[0])])
+    commands.put(0, state.position_world[0] + ahead)
+    worst.append(worst_apart(simulation, 1.5))
+    assert max(worst) < 1e-3
+
+
+def test_what_walkers_put_is_carried_until_they_stand() -> None:
+    simulation = two_handed()
+    simulation.commands.set_locomotion(0, (1.0, 0.0, 0.0))
+    assert worst_apart(simulation, 1.5) < 1e-3
+    assert simulation.state.carry_stage[0] == CARRYING
+    simulation.commands.put(0, (0.0, 1.0, 2.5))
+    assert worst_apart(simulation, 0.5) < 1e-3
+    assert simulation.state.carry_stage[0] == WAITING
+    simulation.commands.set_locomotion(0, (0.0, 0.0, 0.0))
+    assert worst_apart(simulation, 3.0) < 1e-3
+    assert simulation.state.carry_stage[0] == PLACING
+
+
+@pytest.mark.parametrize(("place", "reason"), [
+    ((0.35, 1.0, 0.5), "a wall is in the way"), ((0.17, 1.0, 0.1), "the target is inside the body"),
+])  # fmt: skip
+def test_where_one_hand_cannot_go_neither_goes(place: Any, reason: str) -> None:
+    simulation = two_handed(walls=[[[0.42, 0.1], [0.42, 1.5]]])
+    before = simulation.objects.position_world[0].copy()
+    simulation.commands.put(0, place)
+    assert worst_apart(simulation, 1.0) < 1e-3
+    assert (simulation.state.reach_status[0] == REFUSED).all()
+    assert {event.detail for event in simulation.events} == {reason}
+    assert np.linalg.norm(simulation.objects.position_world[0] - before) < 1e-3
+    simulation.commands.put(0, (0.0, 1.0, 0.5))
+    assert worst_apart(simulation, 1.5) < 1e-3
+    assert (simulation.state.reach_status[0] == REACHED).all()
+
+
+def test_as_near_as_both_hands_get_is_out_of_reach() -> None:
+    simulation = two_handed()
+    simulation.commands.put(0, (0.0, 1.2, 2.0))
+    assert worst_apart(simulation, 2.5) < 1e-3
+    assert (simulation.state.reach_status[0] == OUT_OF_REACH).all()
+    simulation.commands.reach(0, (-0.3, 1.3, 0.3), "right")
+    assert worst_apart(simulation, 1.0) < 1e-3
+    assert [event.detail for event in simulation.events] == ["the other hand holds the object too"]
+
+
+def test_both_hands_give_to_both_hands() -> None:
+    simulation = two_handed(people=[(0, 0, 0, 1.75), (0, 0.95, 180, 1.7), (0, 4.5, 180, 1.7)])
+    simulation.commands.end_reach(0)
+    assert worst_apart(simulation, 1.2) < 1e-3
+    simulation.commands.hand_over(0, 2)
+    simulation.step()
+    assert [event.detail for event in simulation.events] == ["the other person is too far away"]
+    simulation.commands.hand_over(0, 1)
+    assert worst_apart(simulation, 4.0) < 1e-3
+    assert simulation.objects.holder[0] == 1
+    assert simulation.objects.holder_hand[0].all()
+    assert (simulation.state.reach_stage[0] == NONE).all()
+    simulation.commands.end_reach(1)
+    assert worst_apart(simulation, 1.5) < 1e-3
+    assert simulation.state.carry_stage.tolist() == [FREE, CARRYING, FREE]
+
+
+def test_a_hand_can_be_named_where_each_holds_something() -> None:
+    other = {**CUP, "name": "mug", "position": [0.2, 1.0, 0.45]}
+    simulation = simulation_of([CUP, other], [(0, 0, 0, 1.75)])
+    for name, hand in (("cup", "right"), ("mug", "left")):
+        simulation.commands.grasp(0, name, hand)
+    advance(simulation, 2.0)
+    for command in (simulation.commands.put, lambda row, place: simulation.commands.let_go(row, None, place)):
+        with pytest.raises(SettingsError, match="each hand of character 0 holds something"):
+            command(0, (0.0, 1.2, 0.4))
+    before = simulation.objects.position_world.copy()
+    simulation.commands.put(0, (-0.25, 1.2, 0.4), hand="right")
+    advance(simulation, 1.5)
+    assert np.linalg.norm(simulation.objects.position_world[0] - (-0.25, 1.2, 0.4)) < 1e-3
+    assert np.linalg.norm(simulation.objects.position_world[1] - before[1]) < 1e-3
+    simulation.commands.let_go(0, "both")
+    advance(simulation, 0.5)
+    assert simulation.objects.holder.tolist() == [-1, -1]
+
+
+def test_hands_on_their_way_turn_to_what_is_asked_last() -> None:
+    simulation = simulation_of([CUP], [(0, 0, 0, 1.75)])
+    simulation.commands.grasp(0, "cup", "right")
+    advance(simulation, 0.3)
+    simulation.commands.reach(0, (-0.3, 1.4, 0.4), "both")
+    advance(simulation, 2.0)
+    assert simulation.state.grab_status[0].tolist() == [GrabStatus.NONE] * 2
+    assert simulation.state.reach_status[0, 0] == REACHED
+    simulation.commands.grasp(0, "cup", "right")
+    advance(simulation, 0.3)
+    simulation.commands.end_reach(0, "both")
+    advance(simulation, 1.5)
+    assert (simulation.state.reach_stage[0] == NONE).all()
+    assert simulation.state.grab_object[0].tolist() == [-1, -1]
+
+
+def test_hands_and_people_that_are_none_are_one_line() -> None:
+    simulation = simulation_of([CUP], [(0, 0, 0, 1.75), (3, 0, 0, 1.75)])
+    commands = simulation.commands
+    with pytest.raises(SettingsError, match="unknown hand; got 'third'; allowed right, left or both"):
+        commands.end_reach(0, "third")
+    with pytest.raises(
+        SettingsError, match="mask has the wrong length; got 1; allowed one value for each of 2"
+    ):
+        commands.end_reach(np.array([True]))
+    simulation.state.is_active[1] = False
+    for command in (commands.end_reach, lambda row: commands.grasp(row, "cup")):
+        with pytest.raises(SettingsError, match="characters: this one is not there; got 1"):
+            command(1)
 
 
 def test_from_person_to_person_and_from_hand_to_hand() -> None:

@@ -285,7 +285,7 @@ def test_commands_choose_the_hand_by_side_and_end():
 @pytest.mark.parametrize(
     ("keys", "part"),
     [
-        ({"hand": "middle"}, "unknown hand; got 'middle'; allowed right or left"),
+        ({"hand": "middle"}, "unknown hand; got 'middle'; allowed right, left or both"),
         ({"target_world": (1.0, 2.0)}, "target has the wrong shape"),
         ({"seconds": 0.0}, "seconds are out of range"),
         ({"hold": -1.0}, "hold is out of range"),

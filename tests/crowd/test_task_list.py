@@ -197,7 +197,7 @@ def test_whoever_waits_is_told_when_the_other_gives_up(tmp_path):
         (lambda do: do.let_go(0, position_world=(1, 2)), r"let_go: position has the wrong shape; got \(2,\)"),
         (lambda do: do.let_go(0, position_world="there"), "let_go: position is not numbers; got 'there'"),
         (lambda do: do.let_go(0, position_world=[1, [2], 3]), "let_go: position is not numbers"),
-        (lambda do: do.let_go(0, "foot"), "let_go: unknown hand; got 'foot'; allowed right or left"),
+        (lambda do: do.let_go(0, "foot"), "let_go: unknown hand; got 'foot'; allowed right, left or both"),
         (lambda do: do.let_go(0, None, (1, 1, 1), (1.0, 0.0)), "let_go: rotation has the wrong shape"),
         (lambda do: do.put(0, (1, 1, 1), (0.0, 0.0, 0.0, 0.0)), "put: rotation has no length"),
         (lambda do: do.put(0, (1, 1, 1), (float("nan"), 0, 0, 0)), "put: rotation is not finite"),

@@ -103,6 +103,50 @@ def test_what_is_handed_over_changes_hands(tmp_path):
     assert (simulation.state.grab_object[0] < 0).all()
 
 
+CARTON = """
+[[objects]]
+name = "carton"
+shape = "box"
+size = [0.34, 0.25, 0.30]
+position = [-1.0, 0.75, 2.3]
+resting = true
+"""
+
+
+def test_what_is_too_big_for_one_hand_is_carried_and_handed_over_with_both(tmp_path):
+    people = person(
+        "ann", 0.0, -1.0, '{ pick_up = "carton" }, { carry_to = [-1.0, -0.5] }, { hand_over = "ben" }'
+    )
+    people += person("ben", -1.0, 0.5, '{ take_from = "ann" }, { put_down = "table" }')
+    simulation = scene(tmp_path, people + CARTON)
+    finish(simulation, 90.0)
+    assert done(simulation) == ["pick_up", "carry_to", "hand_over", "take_from", "put_down"]
+    assert {event.kind for event in simulation.events} == {
+        EventKind.TASK_DONE, EventKind.OBJECT_TAKEN, EventKind.OBJECT_PUT_DOWN,
+    }  # fmt: skip
+    item = simulation.model.objects.index("carton")
+    assert simulation.objects.holder[item] == -1
+    assert simulation.objects.position_world[item, 1] == pytest.approx(0.875, abs=1e-6)
+    figures = simulation.metrics.as_dict()
+    assert figures["held.apart_mm.max"] < 1.0
+    assert figures["reach.finger_depth_mm.max"] < 1.0
+    assert figures["placed.error_mm.max"] < 2.0
+
+
+def test_what_is_held_already_is_picked_up_at_once(tmp_path):
+    tasks = (
+        '{ pick_up = "can_1", hand = "right" }, { pick_up = "can_1" }, { pick_up = "can_1", hand = "left" }'
+    )
+    simulation = scene(tmp_path, person("ann", 0.0, 0.0, tasks + ', { pick_up = "can_2", hand = "left" }'))
+    finish(simulation, 60.0)
+    assert done(simulation) == ["pick_up"] * 3
+    assert simulation.objects.holder_hand[0].tolist() == [False, True]
+    assert simulation.objects.holder.tolist() == [0, -1]
+    assert [event.detail for event in simulation.events if event.kind is EventKind.TASK_FAILED] == [
+        "the hands hold something else"
+    ]
+
+
 def test_people_sit_on_seats_and_stand_up_to_walk(tmp_path):
     simulation = scene(tmp_path, person("ann", 1.0, -1.0, '{ sit = "stool" }, { walk_to = [0.0, 0.0] }'))
     lowest = np.inf
