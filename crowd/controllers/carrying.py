@@ -44,8 +44,6 @@ class CarryingSettings:
     """m. An object at this distance is where it shall be."""
     angle_tolerance: float = 0.0174533
     """rad. Likewise for its rotation."""
-    sway: float = 1e-4
-    """m. Hands that have just taken an object follow smaller motions of it in a step at once."""
 
 
 class Carrying:
@@ -281,43 +279,49 @@ class Carrying:
         return position, rotation
 
     def _aim(self, state: State, rows: IntArray, items: IntArray, returns: BoolArray, frames: Frames) -> None:
-        """Give both hands their targets, for objects at frames against the root."""
+        """Give both hands their targets, for objects at frames against the root.
+
+        Both bring the same point to the same place: the centre of the object as each has it in its grip. A
+        hand whose wrist does not turn as far as it should then still has the object where the other has it.
+        """
         heading = about(1, state.yaw[rows])
         position = state.position_world[rows] + rotate(heading, frames[0])
         rotation = multiply(heading, frames[1])
         moves = state.carry_seconds[rows] > 0.0
         for hand in (0, 1):
-            place, wanted = self._holding.hand_targets(
+            _, wanted = self._holding.hand_targets(
                 (rows, np.full(rows.size, hand, np.int32)), items, position, rotation
             )
+            grip = self._objects.grip_position[items, hand]
             if returns.any():
-                self._reach.start(state, rows[returns], hand, place[returns], wanted[returns], is_own=True)
+                self._reach.start(
+                    state, rows[returns], hand, position[returns], wanted[returns], grip[returns], is_own=True
+                )
             state.reach_is_own[rows, hand] = True
-            state.reach_target_world[rows, hand] = place
+            state.reach_point_hand[rows, hand] = grip
+            state.reach_target_world[rows, hand] = position
             state.reach_target_rotation_world[rows, hand] = wanted
-            self._follow_at_once(state, rows, hand, multiply(conjugate(heading), wanted), moves)
+            # Motions are smooth and followed at once: hands that lag come off. Those that have just taken
+            # the object turn to rest first.
+            state.reach_seen[rows, hand] = frames[0]
+            state.reach_seen_velocity[rows, hand] = 0.0
+            for name in ("offset", "offset_velocity", "offset_acceleration", "bulge", "time_left"):
+                getattr(state, f"reach_{name}")[rows, hand] = 0.0
+            tight = rows[moves]
+            state.reach_rotation[tight, hand] = multiply(conjugate(heading[moves]), wanted[moves])
+            state.reach_turn_velocity[tight, hand] = 0.0
+            state.reach_turn_acceleration[tight, hand] = 0.0
 
-    def _follow_at_once(
-        self, state: State, rows: IntArray, hand: int, rotation: FloatArray, moves: BoolArray
-    ) -> None:
-        """Let the reach layer follow targets at once: they move smoothly, and hands that lag come off.
-
-        Hands that have just taken it come to rest first: what they lack becomes what is left of their way.
-        """
-        away = state.reach_target_world[rows, hand] - state.position_world[rows]
-        target = rotate(about(1, -state.yaw[rows]), away)
-        shift = target - state.reach_seen[rows, hand]
-        lacks = ~moves & (np.linalg.norm(shift, axis=1) > self.settings.sway)
-        state.reach_offset[rows[lacks], hand] -= shift[lacks]
-        came = rows[lacks & (state.reach_time_left[rows, hand] == 0.0)]
-        state.reach_bulge[came, hand] = 0.0
-        state.reach_time_left[came, hand] = state.reach_plan_time[came, hand] = REACH_LIMITS.least_time
-        state.reach_seen[rows, hand] = target
-        state.reach_seen_velocity[rows, hand] = 0.0
-        tight = rows[moves]
-        state.reach_rotation[tight, hand] = rotation[moves]
-        state.reach_turn_velocity[tight, hand] = 0.0
-        state.reach_turn_acceleration[tight, hand] = 0.0
+    def end(self, state: State, characters: IntArray) -> None:
+        """Let people whose hands open go on with each by itself: targets are those of wrists again."""
+        rows = np.unique(characters[state.carry_stage[characters] != FREE])
+        state.carry_stage[rows] = FREE
+        for hand in (0, 1):
+            point = state.reach_point_hand[rows, hand]
+            world = rotate(state.reach_target_rotation_world[rows, hand], point)
+            state.reach_target_world[rows, hand] -= world
+            state.reach_seen[rows, hand] -= rotate(state.reach_rotation[rows, hand], point)
+            state.reach_point_hand[rows, hand] = 0.0
 
     def report(self, state: State) -> None:
         """Tell how hands with an object between them stand, after the reach layer has told it of each."""

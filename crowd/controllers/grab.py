@@ -632,6 +632,7 @@ class Grab:
     def _open(self, state: State, hands: Hands, status: GrabStatus = GrabStatus.NONE) -> None:
         """Begin to open hands; those that have not closed yet are free at once."""
         rows, side = hands
+        self.carrying.end(state, rows)
         closed = np.isin(state.grab_stage[hands], (CLOSING, HOLDING))
         state.grab_time[rows[closed], side[closed]] = 0.0
         state.grab_stage[rows[closed], side[closed]] = OPENING
