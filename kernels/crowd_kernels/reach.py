@@ -24,7 +24,10 @@ from crowd_kernels.reach_blend import (
     ROW,
     ReachKeys,
     blend_body,
+    bone_of,
     choose_examples,
+    local_rotation,
+    pelvis_of,
     place_hand,
     sum_examples,
     unit_row,
@@ -91,13 +94,7 @@ def carried_hand(
     turned = (1.0, 0.0, 0.0, 0.0)
     for k in range(CHAIN):
         if k > 0:
-            size = float(scale[keys.chain_segment[arm, k]])
-            offset = (
-                size * keys.chain_offset[arm, k, 0],
-                size * keys.chain_offset[arm, k, 1],
-                size * keys.chain_offset[arm, k, 2],
-            )
-            place = add(place, rotate(turned, offset))
+            place = add(place, rotate(turned, bone_of(keys, arm, k, scale)))
         if keys.chain[0, k] == keys.chain[1, k]:
             at = keys.chain_place[arm, k]
             x, y, z = (
@@ -107,14 +104,7 @@ def carried_hand(
             )
             w = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
             turned = multiply(turned, (w, x, y, z))
-        joint = keys.joint[keys.chain[arm, k]]
-        local = (
-            float(pose[joint]),
-            float(pose[PADDED_JOINTS + joint]),
-            float(pose[2 * PADDED_JOINTS + joint]),
-            float(pose[3 * PADDED_JOINTS + joint]),
-        )
-        turned = multiply(turned, local)
+        turned = multiply(turned, local_rotation(pose, keys.joint[keys.chain[arm, k]], PADDED_JOINTS))
     return place, normalized(turned)
 
 
@@ -204,13 +194,7 @@ def aim_hand(
     kept = kept_share(course, state.course_rate[character, arm] * dt, limits.lead)
     out_kept[character, arm] = kept
     kept *= math.exp(-limits.missing_rate * dt)
-    body = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
-    rotation = (
-        float(pose[0]),
-        float(pose[PADDED_JOINTS]),
-        float(pose[2 * PADDED_JOINTS]),
-        float(pose[3 * PADDED_JOINTS]),
-    )
+    body, rotation = pelvis_of(keys, scale, pose, pelvis)
     hand, turned = place_hand(keys, arm, scale, body, rotation, pose, PADDED_JOINTS)
     point = vector_of(state.point_hand, character, arm)
     goal = goal_of(state, character, arm)
@@ -322,14 +306,7 @@ def reach_character(
     """
     row = rows[:ROW]
     total = rows[ROW:]
-    leg = float(scale[keys.leg_segment])
-    live_pelvis = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
-    live_rotation = (
-        float(pose[0]),
-        float(pose[PADDED_JOINTS]),
-        float(pose[2 * PADDED_JOINTS]),
-        float(pose[3 * PADDED_JOINTS]),
-    )
+    live_pelvis, live_rotation = pelvis_of(keys, scale, pose, pelvis)
     own = (0.0, 0.0)
     for arm in range(2):
         if state.stage[character, arm] == NONE:

@@ -597,6 +597,36 @@ def blend_body(
 
 
 @inlined_kernel
+def local_rotation(row: Any, joint: int, stride: int) -> Quaternion:
+    """Read a joint's rotation from a compact row (stride 32) or a pose row (stride 64)."""
+    return (
+        float(row[joint]),
+        float(row[stride + joint]),
+        float(row[2 * stride + joint]),
+        float(row[3 * stride + joint]),
+    )
+
+
+@inlined_kernel
+def bone_of(keys: ReachKeys, arm: int, k: int, scale: Any) -> Vector:
+    """Find the offset of a joint of a hand's chain from the joint above, in that one's frame, m."""
+    size = float(scale[keys.chain_segment[arm, k]])
+    return (
+        size * keys.chain_offset[arm, k, 0],
+        size * keys.chain_offset[arm, k, 1],
+        size * keys.chain_offset[arm, k, 2],
+    )
+
+
+@inlined_kernel
+def pelvis_of(keys: ReachKeys, scale: Any, pose: Any, pelvis: Any) -> tuple[Vector, Quaternion]:
+    """Read where the pelvis of a pose row is in the character's own size, m, and its rotation; root frame."""
+    leg = float(scale[keys.leg_segment])
+    place = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
+    return place, local_rotation(pose, 0, PADDED_JOINTS)
+
+
+@inlined_kernel
 def place_hand(
     keys: ReachKeys, arm: int, scale: Any, pelvis: Vector, pelvis_rotation: Quaternion, row: Any, stride: int
 ) -> tuple[Vector, Quaternion]:
@@ -624,21 +654,9 @@ def place_hand(
     place = pelvis
     turned = pelvis_rotation
     for k in range(1, CHAIN):
-        size = float(scale[keys.chain_segment[arm, k]])
-        offset = (
-            size * keys.chain_offset[arm, k, 0],
-            size * keys.chain_offset[arm, k, 1],
-            size * keys.chain_offset[arm, k, 2],
-        )
-        place = add(place, rotate(turned, offset))
+        place = add(place, rotate(turned, bone_of(keys, arm, k, scale)))
         joint = keys.chain[arm, k]
         if stride == PADDED_JOINTS:
             joint = keys.joint[joint]
-        local = (
-            float(row[joint]),
-            float(row[stride + joint]),
-            float(row[2 * stride + joint]),
-            float(row[3 * stride + joint]),
-        )
-        turned = multiply(turned, local)
+        turned = multiply(turned, local_rotation(row, joint, stride))
     return place, normalized(turned)

@@ -19,7 +19,7 @@ from crowd_kernels.quaternion import (
     rotate,
     rotation_vector,
 )
-from crowd_kernels.reach_blend import ReachKeys, place_hand
+from crowd_kernels.reach_blend import ReachKeys, pelvis_of, place_hand
 from crowd_kernels.reach_goal import ReachState, quaternion_of, set_vector, vector_of
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
@@ -109,14 +109,7 @@ def find_missing(
     -----
     Arguments are those of `find_missing_crowd`, for one character.
     """
-    leg = float(scale[keys.leg_segment])
-    body = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
-    rotation = (
-        float(pose[0]),
-        float(pose[PADDED_JOINTS]),
-        float(pose[2 * PADDED_JOINTS]),
-        float(pose[3 * PADDED_JOINTS]),
-    )
+    body, rotation = pelvis_of(keys, scale, pose, pelvis)
     hand, turned = place_hand(keys, arm, scale, body, rotation, pose, PADDED_JOINTS)
     tip = add(hand, rotate(turned, vector_of(state.point_hand, character, arm)))
     away = subtract(vector_of(target, character, arm), tip)
