@@ -450,8 +450,6 @@ class Grab:
         if rows.size == 0:
             return
         position, rotation, fits = self.placement.of_both_hands(state, rows, items)
-        # What was too big for the first hand alone is not refused for that.
-        state.grab_refusals[rows] -= state.grab_status[rows] == GrabStatus.TOO_BIG
         for side in (0, 1):
             hands = np.full(rows.size, side, np.int32)
             state.grab_object[rows, side] = items

@@ -18,7 +18,7 @@ BLOCKED = "a wall is in the way"
 REASONS = {
     GrabStatus.REFUSED: "there is no such object, or the hand holds something else",
     GrabStatus.TAKEN: "somebody else holds the object",
-    GrabStatus.TOO_BIG: "the object is too big for one hand",
+    GrabStatus.TOO_BIG: "the object is too big for the hands that were asked",
     GrabStatus.MISSED: "the fingers met nothing",
     GrabStatus.TOO_LATE: "the hand has not come to the object for long",
     GrabStatus.EMPTY: "there is nothing in the hand",

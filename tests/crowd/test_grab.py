@@ -233,6 +233,16 @@ def test_bad_requests_give_a_status(run: Simulation) -> None:
     assert np.abs(state.pose_rotation - pose).max() < 0.3
 
 
+def test_hands_that_go_together_keep_what_one_of_them_was_refused_before(run: Simulation) -> None:
+    state = run.state
+    run.grab.grasp(state, rows(0), 1, CARTON)
+    assert state.grab_refusals[0].tolist() == [0, 1]
+    run.step()
+    run.grab.grasp_both(state, rows(0), CARTON)
+    assert state.grab_refusals[0].tolist() == [0, 1], "both hands together are large enough"
+    assert (state.grab_status[0] == GrabStatus.APPROACHING).all()
+
+
 def test_a_hand_that_holds_something_takes_nothing_else(run: Simulation) -> None:
     holding(run)
     run.grab.grasp(run.state, rows(0), 1, ROD)
