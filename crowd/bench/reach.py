@@ -12,7 +12,7 @@ from crowd.controllers.controller import Step
 from crowd.motion.clip import Clip
 from crowd.motion.library import MotionLibrary
 from crowd.motion.rotation import conjugate, from_vector, multiply, rotate, to_vector
-from crowd.scenario.schema import Area, Character, Scenario, WorldTable
+from crowd.scenario.schema import DEFAULT_DT, Area, Character, Scenario, WorldTable
 from crowd.simulation import Simulation
 from crowd_kernels.reach_goal import OUT_OF_REACH, REACHED
 
@@ -81,9 +81,13 @@ class Reachers:
     seed : int
     motions : MotionLibrary, optional
         Whose reaches are blended; the built-in library when left out.
+    dt : float
+        s.
     """
 
-    def __init__(self, people: int, seed: int, motions: MotionLibrary | None = None) -> None:
+    def __init__(
+        self, people: int, seed: int, motions: MotionLibrary | None = None, dt: float = DEFAULT_DT
+    ) -> None:
         side = math.ceil(math.sqrt(people))
         rng = np.random.default_rng(seed)
         facing = rng.uniform(-180.0, 180.0, people)
@@ -92,7 +96,7 @@ class Reachers:
             for k in range(people)
         )
         ground = Area(x=(-side - 4.0, side + 4.0), z=(-side - 4.0, side + 4.0))
-        scenario = Scenario(name="reach", world=WorldTable(bounds=ground), characters=characters)
+        scenario = Scenario(name="reach", dt=dt, world=WorldTable(bounds=ground), characters=characters)
         self.simulation = Simulation(scenario, seed=seed, motions=motions)
         self.rows = np.arange(people, dtype=np.int32)
         self.size = self.simulation.model.people.stature / self.simulation.model.skeleton.stature

@@ -16,7 +16,13 @@ TOE_LENGTH = 0.04
 """Tip of the foot before the ball, over stature."""
 
 LOCK_LIMITS = LockLimits(
-    release_distance=0.2, release_yaw=0.6, stretch=0.99, swing_rate=16.0, ground_rate=30.0, pelvis_rate=28.0
+    release_distance=0.2,
+    release_yaw=0.6,
+    stretch=0.99,
+    swing_rate=16.0,
+    ground_rate=30.0,
+    pelvis_speed=0.2,
+    pelvis_rate=28.0,
 )
 
 
@@ -43,7 +49,10 @@ class FootLock:
         self.offset_rate: FloatArray = aligned_zeros((capacity, 2, 3))
         self.yaw_offset: FloatArray = aligned_zeros((capacity, 2))
         self.yaw_offset_rate: FloatArray = aligned_zeros((capacity, 2))
-        self.drop: FloatArray = aligned_zeros((capacity, 2))
+        self.leg_need: FloatArray = aligned_zeros((capacity, 2))
+        self.deciding: ByteArray = aligned_zeros(capacity, np.uint8)
+        self.drop_gap: FloatArray = aligned_zeros((capacity, 2))
+        self.drop: FloatArray = aligned_zeros(capacity)
 
     def state_fields(self) -> dict[str, npt.NDArray[np.generic]]:
         """Arrays that change in a run."""
@@ -56,6 +65,9 @@ class FootLock:
             "offset_rate",
             "yaw_offset",
             "yaw_offset_rate",
+            "leg_need",
+            "deciding",
+            "drop_gap",
             "drop",
         )
         return {name: getattr(self, name) for name in names}
@@ -98,6 +110,9 @@ class FootLock:
             self.offset_rate,
             self.yaw_offset,
             self.yaw_offset_rate,
+            self.leg_need,
+            self.deciding,
+            self.drop_gap,
             self.drop,
             out_foot_point_world,
             out_foot_contact,

@@ -12,10 +12,15 @@ from crowd_kernels.limb_ik import bend_rotations, turned
 from crowd_kernels.locomotion import ease, wrapped_angle
 from crowd_kernels.pose import joint_rotation, set_joint_rotation
 from crowd_kernels.quaternion import Quaternion, conjugate, from_yaw, multiply, normalized, rotate
-from crowd_kernels.vector import Vector, add, subtract
+from crowd_kernels.vector import Vector, add, norm, subtract
 
 CHUNKS = 32
 TWO = np.float64(2.0)
+UNKNOWN, NEITHER, FIRST_LEG = 0, 1, 2
+"""What decides how far the pelvis is lowered: not known yet, no leg, or from here on one of the legs."""
+TINY = 1e-12
+LOWEST = 0.12
+"""How far the pelvis is lowered at most, m at leg scale 1."""
 
 
 class LegArrays(NamedTuple):
@@ -48,8 +53,10 @@ class LockLimits(NamedTuple):
     """Rate at which the offset fades while the foot swings, 1/s."""
     ground_rate: float
     """Rate at which the height of a planted foot is corrected, 1/s."""
+    pelvis_speed: float
+    """Speed up to which the pelvis follows at once what a leg needs, m/s at leg scale 1."""
     pelvis_rate: float
-    """Rate at which the pelvis is lowered for feet out of reach, 1/s."""
+    """Rate at which it follows what goes beyond, and settles when another leg decides, 1/s."""
 
 
 @inlined_kernel
@@ -179,6 +186,114 @@ def plan_foot(
 
 
 @inlined_kernel
+def needed_drop(hip: Vector, target: Vector, length: float, stretch: float) -> float:
+    """Find how far the hip must come down for a foot: softly more as the leg comes near its largest stretch.
+
+    The nearer a leg is to straight, the faster its knee turns with the way to the foot: at a bare limit a
+    knee that straightens would stop dead.
+
+    Parameters
+    ----------
+    hip, target : tuple of float
+        Hip in the animation and place of the ankle, in one frame, m.
+    length : float
+        Of the straight leg, m.
+    stretch : float
+        Largest share of it that is used.
+
+    Returns
+    -------
+    float
+        m, not negative.
+    """
+    away = (target[0] - hip[0]) ** 2 + (target[2] - hip[2]) ** 2
+    height = hip[1] - target[1]
+    least = max(1.0 - stretch, TINY)
+    # What lacks from straight: all of it where the leg is bent, `least` where it would have to be straight.
+    slack = max(1.0 - math.sqrt(away + height * height) / length, 0.0)
+    used = (1.0 - slack - least * math.exp(-slack / least)) * length
+    return max(height - math.sqrt(max(used * used - away, 0.0)), 0.0)
+
+
+@inlined_kernel
+def followed_rate(need: float, before: float, fastest: float, dt: float) -> float:
+    """Find how fast the pelvis follows a leg's need at once, m/s."""
+    return min(max((need - before) / dt, -fastest), fastest)
+
+
+@inlined_kernel
+def lower_pelvis(
+    character: int,
+    right: float,
+    left: float,
+    leg_scale: float,
+    limits: LockLimits,
+    dt: float,
+    contact: Any,
+    leg_need: Any,
+    deciding: Any,
+    drop_gap: Any,
+    drop: Any,
+) -> None:
+    """Lower the pelvis as far as the planted leg needs that needs most, in place.
+
+    While one leg decides, the pelvis follows its need at once, so that the leg never comes to its limit with
+    speed. Where another one takes over, needs and rates differ: the difference becomes a gap that is eased
+    away, as is what feet need that are dragged off faster than people sink.
+
+    Parameters
+    ----------
+    character : int
+    right, left : float
+        What each leg needs, planted or not, m.
+    leg_scale : float
+        Scale of the character's legs.
+    limits : LockLimits
+    dt : float
+        s.
+    contact : (N, 2) uint8
+        Contact in force.
+    leg_need : (N, 2) float64
+        In and out: what the legs needed in the last step, m.
+    deciding : (N,) uint8
+        In and out: `UNKNOWN`, `NEITHER` or `FIRST_LEG` and on.
+    drop_gap : (N, 2) float64
+        In and out: how far the pelvis is lower than the deciding leg needs, m, and its rate, m/s.
+    drop : (N,) float64
+        Written: how far the pelvis is lowered, m.
+
+    Notes
+    -----
+    **Source:** Bollo, "Inertialization: high-performance animation transitions in Gears of War", 2018.
+    **Differs from the source:** the gap fades as a critically damped spring instead of a polynomial.
+    """
+    fastest = limits.pelvis_speed * leg_scale
+    now, need, rate = NEITHER, 0.0, 0.0
+    if contact[character, 0] != SWING and right > need:
+        now, need = FIRST_LEG, right
+    if contact[character, 1] != SWING and left > need:
+        now, need = FIRST_LEG + 1, left
+    before = deciding[character]
+    gap, gap_rate = drop_gap[character, 0], drop_gap[character, 1]
+    if before != UNKNOWN:
+        right_rate = followed_rate(right, leg_need[character, 0], fastest, dt)
+        left_rate = followed_rate(left, leg_need[character, 1], fastest, dt)
+        if before >= FIRST_LEG:
+            gap += leg_need[character, before - FIRST_LEG]
+            gap_rate += right_rate if before == FIRST_LEG else left_rate
+        if now >= FIRST_LEG:
+            rate = right_rate if now == FIRST_LEG else left_rate
+        gap, gap_rate = ease(gap - (need - rate * dt), gap_rate - rate, 0.0, limits.pelvis_rate, dt)
+    lowered = min(max(need + gap, 0.0), LOWEST * leg_scale)
+    if lowered != need + gap:
+        gap, gap_rate = lowered - need, 0.0
+    leg_need[character, 0], leg_need[character, 1] = right, left
+    deciding[character] = now
+    drop_gap[character, 0], drop_gap[character, 1] = gap, gap_rate
+    drop[character] = lowered
+
+
+@inlined_kernel
 def lock_character(
     character: int,
     legs: LegArrays,
@@ -198,6 +313,9 @@ def lock_character(
     offset_rate: Any,
     yaw_offset: Any,
     yaw_offset_rate: Any,
+    leg_need: Any,
+    deciding: Any,
+    drop_gap: Any,
     drop: Any,
     out_foot_point_world: Any,
     out_foot_contact: Any,
@@ -215,7 +333,7 @@ def lock_character(
     facing = from_yaw(yaw[character])
     unfacing = conjugate(facing)
     place = (position_world[character, 0], 0.0, position_world[character, 2])
-    wanted_drop = 0.0
+    needs = (0.0, 0.0)
     # The two feet are planned first, because both decide how far the pelvis must come down.
     for leg in range(2):
         thigh = normalized(multiply(pelvis_rotation, joint_rotation(row, legs.joint[leg, 0])))
@@ -259,19 +377,23 @@ def lock_character(
         out_foot_point_world[character, leg, 0, 0] = target[0]
         out_foot_point_world[character, leg, 0, 1] = target[1]
         out_foot_point_world[character, leg, 0, 2] = target[2]
-        if contact[character, leg] != SWING:
-            reach = limits.stretch * (
-                math.sqrt(upper[0] * upper[0] + upper[1] * upper[1] + upper[2] * upper[2])
-                + math.sqrt(lower[0] * lower[0] + lower[1] * lower[1] + lower[2] * lower[2])
-            )
-            away = (target[0] - hip[0]) ** 2 + (target[2] - hip[2]) ** 2
-            height = math.sqrt(max(reach * reach - away, 0.0))
-            wanted_drop = max(wanted_drop, hip[1] - target[1] - height)
-    wanted_drop = min(wanted_drop, 0.12 * leg_scale)
-    lowered, drop_rate = ease(drop[character, 0], drop[character, 1], wanted_drop, limits.pelvis_rate, dt)
-    drop[character, 0] = max(lowered, 0.0)
-    drop[character, 1] = drop_rate
-    pelvis = (pelvis[0], pelvis[1] - drop[character, 0], pelvis[2])
+        length = norm(upper) + norm(lower)
+        need = min(needed_drop(hip, target, length, limits.stretch), LOWEST * leg_scale)
+        needs = (need, needs[1]) if leg == 0 else (needs[0], need)
+    lower_pelvis(
+        character,
+        needs[0],
+        needs[1],
+        leg_scale,
+        limits,
+        dt,
+        contact,
+        leg_need,
+        deciding,
+        drop_gap,
+        drop,
+    )
+    pelvis = (pelvis[0], pelvis[1] - drop[character], pelvis[2])
     pose_pelvis[character, 1] = pelvis[1] / leg_scale
     for leg in range(2):
         thigh = normalized(multiply(pelvis_rotation, joint_rotation(row, legs.joint[leg, 0])))
@@ -326,6 +448,9 @@ def lock_feet_crowd(
     offset_rate: Any,
     yaw_offset: Any,
     yaw_offset_rate: Any,
+    leg_need: Any,
+    deciding: Any,
+    drop_gap: Any,
     drop: Any,
     out_foot_point_world: Any,
     out_foot_contact: Any,
@@ -364,8 +489,14 @@ def lock_feet_crowd(
         In and out: correction of each foot's place and its rate, m, m/s.
     yaw_offset, yaw_offset_rate : (N, 2) float64
         In and out: correction of each foot's heading and its rate, rad, rad/s.
-    drop : (N, 2) float64
-        In and out: how far the pelvis is lowered, m, and its rate, m/s.
+    leg_need : (N, 2) float64
+        In and out: how far each leg needs the pelvis lowered, m.
+    deciding : (N,) uint8
+        In and out: which leg decides how far it is lowered, see `lower_pelvis`.
+    drop_gap : (N, 2) float64
+        In and out: how far it is lower than that leg needs, m, and its rate, m/s.
+    drop : (N,) float64
+        How far the pelvis is lowered, m.
     out_foot_point_world : (N, 2, 2, 3) float64
         Heel and ball of each foot in the final pose, m.
     out_foot_contact : (N, 2) uint8
@@ -401,6 +532,9 @@ def lock_feet_crowd(
                 offset_rate,
                 yaw_offset,
                 yaw_offset_rate,
+                leg_need,
+                deciding,
+                drop_gap,
                 drop,
                 out_foot_point_world,
                 out_foot_contact,

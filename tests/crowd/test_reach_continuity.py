@@ -1,4 +1,4 @@
-"""Reaches go on smoothly when hands come and go one after the other, and below what they cannot have."""
+"""Reaches go on smoothly when hands come and go, when people crouch, and below what they cannot have."""
 
 import numpy as np
 import pytest
@@ -92,3 +92,35 @@ def test_hands_rest_below_rotations_that_they_cannot_have(reachers, hand, is_far
     if not is_far:
         assert np.linalg.norm(places[-1] - target, axis=1).max() < 5e-3
         assert np.median(angle) < 2.4 / 2
+
+
+def leg_motion(legs, dt):
+    """Largest angular acceleration of thighs, shanks and feet over frames (F, N, 6, 4), in their order."""
+    return [angular_motion(np.array(legs)[:, :, part::3], dt)[1] for part in range(3)]
+
+
+@pytest.mark.parametrize("frame_rate", [60, 120])
+@pytest.mark.parametrize("hand", [0, 1])
+def test_legs_bend_and_straighten_smoothly_for_what_lies_low(hand, frame_rate, rng):
+    """Knees start and stop as softly as those of the examples, above feet that stay in place."""
+    reachers = Reachers(PEOPLE, seed=5, dt=1 / frame_rate)
+    simulation = reachers.simulation
+    legs = simulation.foot_lock.legs.joint[:, :3].ravel()
+    target = rng.uniform((-0.5, 0.05, 0.2), (0.2, 0.5, 0.7), (PEOPLE, 3)) * reachers.size[:, None]
+    rotations, balls, pelvis = [], [], []
+
+    def watch(seconds):
+        for _ in simulation.run(seconds=seconds):
+            rotations.append(simulation.joint_rotations_local()[:, legs].astype(float))
+            balls.append(simulation.state.foot_point_world[:, :, 1].copy())
+            pelvis.append(simulation.pelvis_positions_root()[:, 1])
+
+    watch(0.1)
+    reachers.reach(hand, target * ((1, 1, 1) if hand == 0 else (-1, 1, 1)))
+    watch(1.6)
+    simulation.reach.end(simulation.state, reachers.rows, hand)
+    watch(1.8)
+    assert not simulation.state.reach_stage.any()
+    assert np.median(np.ptp(pelvis, axis=0)) > 0.25, "people crouch"
+    assert max(leg_motion(rotations, simulation.dt)) < allowed(reachers)
+    assert np.abs(np.array(balls) - balls[0])[..., [0, 2]].max() < 1e-6

@@ -9,27 +9,30 @@ from tests.oracles import pose as oracle
 
 DT = 1 / 60
 SKELETON = build_skeleton()
-HIP = SKELETON.offset[SKELETON.joint("left_thigh")]
+SIDES = ("right", "left")
 
 
 class Puppet:
     """People on slightly bent legs whose root is moved about."""
 
-    def __init__(self, count=1, scale=1.0):
-        self.count = count
-        self.lock = FootLock(SKELETON, capacity=count, dt=DT)
+    def __init__(self, count=1, scale=1.0, dt=DT):
+        self.count, self.dt = count, dt
+        self.lock = FootLock(SKELETON, capacity=count, dt=dt)
         self.scale = np.full((count, 8), scale, np.float32)
         self.position, self.yaw = np.zeros((count, 3)), np.zeros(count)
         self.contact = np.full((count, 2), 2, np.uint8)
         self.point, self.effective = np.zeros((count, 2, 2, 3)), np.zeros((count, 2), np.uint8)
         self.pose, self.pelvis = np.zeros((count, 256), np.float32), np.zeros((count, 3), np.float32)
 
-    def step(self, sink=0.04, build=None):
+    def step(self, sink=0.04, stride=0.0):
+        """Lock legs that are bent as far as the pelvis sinks, m; a stride, rad, puts the left one forward."""
         quaternions = np.zeros((SKELETON.joint_count, 4))
         quaternions[:, 0] = 1
         bend = np.arccos(1 - sink / 0.86)
-        for side in ("right", "left"):
-            for part, angle in (("thigh", -bend), ("shank", 2 * bend), ("foot", -bend)):
+        standing = (("thigh", -bend), ("shank", 2 * bend), ("foot", -bend))
+        striding = (("thigh", -stride), ("shank", 0.01), ("foot", stride))
+        for side, angles in (("right", standing), ("left", striding if stride else standing)):
+            for part, angle in angles:
                 quaternions[SKELETON.joint(f"{side}_{part}")] = [np.cos(angle / 2), np.sin(angle / 2), 0, 0]
         self.pose[:] = oracle.quaternions_to_row(quaternions)
         self.pelvis[:] = SKELETON.offset[0] - (0, sink, 0)
@@ -41,7 +44,7 @@ class Puppet:
             self.yaw,
             self.contact,
             np.arange(self.count, dtype=np.int32),
-            DT,
+            self.dt,
             self.point,
             self.effective,
         )
@@ -153,7 +156,78 @@ def test_the_pelvis_comes_down_for_feet_out_of_reach():
     for _ in range(30):
         puppet.position[0, 2] += 0.3 * DT
         puppet.step(sink=0.01)
-    assert 0.0 < puppet.lock.drop[0, 0] < 0.12
+    assert 0.0 < puppet.lock.drop[0] < 0.12
+
+
+def knee_angles(puppet):
+    """Angle of each knee, rad."""
+    rows = oracle.row_to_quaternions(puppet.pose[0])
+    return np.array([2 * np.arccos(abs(rows[SKELETON.joint(f"{side}_shank")][0])) for side in SIDES])
+
+
+def straighten(puppet, seconds=0.8, deep=0.30, high=0.0):
+    """Knee angles (F, 2) and ankle heights (F, 2) while the body rises until it hangs above its feet."""
+    angles, heights = [], []
+    for time in np.arange(0, seconds + 0.5, puppet.dt):
+        share = min(time / seconds, 1)
+        rise = share**3 * (share * (6 * share - 15) + 10)
+        puppet.step(sink=deep + (high - deep) * rise)
+        angles.append(knee_angles(puppet))
+        heights.append([ankle_from_pose(puppet, side)[1] for side in SIDES])
+    return np.array(angles), np.array(heights)
+
+
+@pytest.mark.parametrize("frame_rate", [60, 120, 240])
+def test_knees_do_not_stop_dead_when_legs_straighten(frame_rate):
+    puppet = Puppet(dt=1 / frame_rate)
+    angles, _ = straighten(puppet)
+    speed = np.diff(angles, axis=0) * frame_rate
+    free = 2 * np.arccos(1 - 0.3 / 0.86) / 0.8
+    assert np.abs(speed).max() > free, "the knees move"
+    assert np.abs(np.diff(speed, axis=0)).max() * frame_rate < 60
+    assert angles[-1] == pytest.approx(2 * np.arccos(0.99), abs=0.02)
+
+
+def test_planted_feet_stay_down_when_legs_straighten():
+    _, heights = straighten(Puppet())
+    assert np.abs(heights - heights[0]).max() < 1e-4
+
+
+def test_the_pelvis_does_not_jump_when_an_outstretched_leg_lands_and_the_other_one_leaves():
+    puppet = Puppet()
+    puppet.contact[:] = (2, 0)
+    heights = []
+    for step in range(60):
+        if step == 20:
+            puppet.contact[:] = (2, 2)
+        if step == 40:
+            puppet.contact[:] = (2, 0)
+        puppet.step(sink=0.86 * (1 - np.cos(0.35)), stride=0.35)
+        heights.append(puppet.pelvis[0, 1])
+    velocity = np.diff(heights) / DT
+    assert np.ptp(heights) > 0.004, "the second leg needs more"
+    assert np.abs(np.diff(velocity)).max() < 0.1
+
+
+def test_the_pelvis_does_not_plunge_for_feet_that_are_dragged_off():
+    puppet = Puppet()
+    heights = []
+    for _ in range(40):
+        puppet.position[0, 2] -= 1.5 * DT
+        puppet.step(sink=0.86 * (1 - np.cos(0.35)), stride=0.35)
+        heights.append(puppet.pelvis[0, 1])
+    assert puppet.lock.is_released.any()
+    assert np.abs(np.diff(heights)).max() / DT < 0.8
+
+
+def test_people_enter_standing_as_deep_as_they_stay():
+    puppet = Puppet()
+    puppet.step(sink=0.0)
+    entered = puppet.pelvis[0, 1]
+    for _ in range(30):
+        puppet.step(sink=0.0)
+    assert puppet.pelvis[0, 1] == pytest.approx(entered, abs=1e-6)
+    assert entered < SKELETON.offset[0, 1] - 0.005
 
 
 def test_reset_forgets_and_only_active_people_change():
