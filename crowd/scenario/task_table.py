@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from crowd.scenario.table import Coordinate, NotNegative, Point, Table, refuse
+from crowd.scenario.table import Coordinate, NotNegative, Number, Point, Table, refuse
 
-Height = Annotated[float, Field(ge=0.0, le=3.0)]
+Height = Annotated[Number, Field(ge=0.0, le=3.0)]
 SpacePoint = tuple[Coordinate, Height, Coordinate]
 
 ACTIONS = (
@@ -67,7 +67,8 @@ class TaskTable(Table):
     carry_to: Somewhere | None = None
     """The same with something in the hands; fails with empty ones."""
     pick_up: Name | None = None
-    """Walk to an object, reach and grasp it; a name without number means the nearest free one of its kind."""
+    """Walk to an object, reach and grasp it; a name without number means the nearest free one of its kind
+    that nobody has put down yet."""
     put_down: Something | None = None
     """Walk to a free place on a piece of furniture, or to a point [x, y, z] of a surface, and put down what
     the hand holds."""

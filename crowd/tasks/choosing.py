@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from crowd.state import FloatArray, IntArray
+from crowd.state import FloatArray
 from crowd.tasks.partners import missing_half
 from crowd.tasks.present_task import (
     are_empty,
@@ -84,8 +84,13 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     if (outcome := _with_own(tasks, row, items)) is not Outcome.FAIL:
         return outcome
     is_free = (objects.holder[items] < 0) & ((tasks.claimed_by[items] < 0) | (tasks.claimed_by[items] == row))
+    if tasks.names.is_family(group):
+        is_left = ~tasks.is_delivered[items]
+        if not is_left.any():
+            return Outcome.NOTHING_LEFT
+        items, is_free = items[is_left], is_free[is_left]
     has_taken = not is_free.all()
-    items = items[is_free & ~np.isin(items, _delivered(tasks))]
+    items = items[is_free]
     away = np.linalg.norm(objects.position_world[items] - simulation.state.position_world[row], axis=1)
     is_high = objects.position_world[items, 1] > HIGHEST * simulation.model.people.stature[row]
     nearest = items[np.lexsort((away, is_high))][:MOST_CONSIDERED]
@@ -129,11 +134,6 @@ def _that_are_somewhere(tasks: Tasks, group: int) -> npt.NDArray[np.intp]:
     """Objects of a name, without those whose position is not finite."""
     items = np.array(tasks.names.groups[group], np.intp)
     return items[np.isfinite(tasks.simulation.objects.position_world[items]).all(axis=1)]
-
-
-def _delivered(tasks: Tasks) -> IntArray:
-    """Objects that somebody has put down; a family name does not mean them any more."""
-    return np.flatnonzero(tasks.is_delivered).astype(np.int32)
 
 
 def choose_touch(tasks: Tasks, row: int, time: float) -> Outcome:

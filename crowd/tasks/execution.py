@@ -38,6 +38,7 @@ HOPELESS = {
     Outcome.NOWHERE: "the object is nowhere",
     Outcome.HANDS_FULL: "the hands hold something else",
     Outcome.BEHIND_WALLS: "obstacles are in the way from every place to stand",
+    Outcome.NOTHING_LEFT: "all of the kind have been put down already",
 }
 """Why tasks fail without another look."""
 RESTING = 255
@@ -79,7 +80,7 @@ class Tasks:
     held_heading : (M,) float64
         Heading of an object against the direction in which a person has reached for it, rad.
     is_delivered : (M,) bool
-        Somebody has put the object down; the name of its kind does not mean it any more.
+        Somebody has put the object down; the name of its kind does not mean it any more, its own does.
     """
 
     def __init__(self, simulation: Simulation) -> None:

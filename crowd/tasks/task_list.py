@@ -127,6 +127,10 @@ class TaskNames:
             clips,
         )
 
+    def is_family(self, group: int) -> bool:
+        """Whether a name stands for several things: any of a kind."""
+        return len(self.groups[group]) > 1
+
     def choices(self, action: str) -> tuple[tuple[Target, Mapping[str, int]], ...]:
         """What the name in a task with this action may stand for."""
         match action:

@@ -54,6 +54,8 @@ class Outcome(Enum):
     """The hands that are to do it hold something else."""
     DONE = 8
     """It is so already."""
+    NOTHING_LEFT = 9
+    """All of the kind have been put down, and stay where they are."""
 
 
 class Wait(IntEnum):

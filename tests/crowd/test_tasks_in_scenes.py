@@ -83,6 +83,25 @@ def test_two_people_take_two_things_of_one_kind(tmp_path):
     assert sorted(simulation.objects.holder.tolist()) == [0, 1]
 
 
+def test_its_own_name_means_a_thing_that_was_put_down_too(tmp_path):
+    tasks = '{ pick_up = "can_1" }, { put_down = "table" }, { pick_up = "can_1" }, { wait = 0.5 }'
+    simulation = scene(tmp_path, person("ann", 0.0, 0.0, tasks))
+    finish(simulation, 60.0)
+    assert done(simulation) == ["pick_up", "put_down", "pick_up", "wait"]
+    assert simulation.objects.holder.tolist() == [0, -1]
+
+
+def test_nobody_waits_for_a_kind_of_which_all_are_put_down(tmp_path):
+    fetch = '{ pick_up = "can" }, { put_down = "table" }, '
+    simulation = scene(tmp_path, person("ann", 0.0, 0.0, fetch * 2 + '{ pick_up = "can" }'))
+    finish(simulation, 90.0)
+    assert done(simulation) == ["pick_up", "put_down", "pick_up", "put_down"]
+    last, before = list(simulation.events)[-1], list(simulation.events)[-2]
+    assert last.kind is EventKind.TASK_FAILED
+    assert last.detail == "all of the kind have been put down already"
+    assert last.time - before.time < 0.2
+
+
 def test_of_two_things_the_named_hand_puts_its_own_down(tmp_path):
     tasks = (
         '{ pick_up = "can_1", hand = "right" }, { pick_up = "can_2", hand = "left" }, '
