@@ -1,4 +1,4 @@
-"""Who hands over and who takes: each of the two tasks needs its other half in the other person's list."""
+"""Tasks about others: who hands over and who takes need each other, and nobody means oneself."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 from crowd.errors import nearest_first
 from crowd.scenario import PlacedCharacters
 from crowd.scenario.source import Problems, ScenarioSource
-from crowd.tasks.task_list import TaskArrays, TaskKind
+from crowd.tasks.task_list import Target, TaskArrays, TaskKind
 
 if TYPE_CHECKING:
     from crowd.tasks.execution import Tasks
 
 OTHER_HALF = {TaskKind.HAND_OVER: TaskKind.TAKE_FROM, TaskKind.TAKE_FROM: TaskKind.HAND_OVER}
+WITH_ONESELF = "nobody does this with oneself"
 
 
 def check_partners(arrays: TaskArrays, placed: PlacedCharacters, source: ScenarioSource) -> None:
-    """Check that nobody waits for somebody who has no task for it.
+    """Check that nobody waits for somebody who has no task for it, and that no task is about oneself.
 
     Parameters
     ----------
@@ -31,15 +32,30 @@ def check_partners(arrays: TaskArrays, placed: PlacedCharacters, source: Scenari
     Raises
     ------
     ScenarioError
-        With a line for each `hand_over` and `take_from` without its other half.
+        With a line for each `hand_over` and `take_from` without its other half, and for each task about
+        oneself.
     """
     problems = Problems(source)
-    is_shared = np.isin(arrays.kind, tuple(OTHER_HALF)) & (np.arange(arrays.length) < arrays.count[:, None])
-    for row, column in np.argwhere(is_shared):
+    is_there = np.arange(arrays.length) < arrays.count[:, None]
+    is_shared = np.isin(arrays.kind, tuple(OTHER_HALF)) & is_there
+    is_own = (arrays.target_kind == Target.CHARACTER) & (
+        arrays.target == np.arange(len(arrays.count))[:, None]
+    )
+    for row, column in np.argwhere(is_own & is_there):
+        # A list that many people have may name one of them: the others look at that one.
+        if is_shared[row, column] or placed.location[row][0] == "characters":
+            kind, name = TaskKind(int(arrays.kind[row, column])), placed.name[row]
+            problems.add(
+                (*placed.location[row], "tasks", int(column), kind.name.lower()),
+                WITH_ONESELF,
+                name,
+                nearest_first(name, set(placed.name) - {name}) or "somebody else, but there is nobody",
+            )
+    for row, column in np.argwhere(is_shared & ~is_own):
         kind, other = TaskKind(int(arrays.kind[row, column])), int(arrays.target[row, column])
         same = is_shared[row, : column + 1] & (arrays.kind[row, : column + 1] == kind)
         wanted = int((same & (arrays.target[row, : column + 1] == other)).sum())
-        found = 0 if other == row else _count(arrays, other, OTHER_HALF[kind], row)
+        found = _count(arrays, other, OTHER_HALF[kind], row)
         begins_again = placed.repeats_goals[other] or placed.is_from_flow[other]
         if found >= wanted or (found and begins_again):
             continue
@@ -62,7 +78,7 @@ def missing_half(tasks: Tasks, row: int) -> str:
     other = int(tasks.lists.target[row, tasks.index[row]])
     placed = tasks.simulation.model.placed
     if other == row:
-        return "nobody does this with oneself"
+        return WITH_ONESELF
     if not tasks.simulation.state.is_active[other]:
         return f"{placed.name[other]} is not there"
     first = 0 if placed.repeats_goals[other] else int(tasks.index[other])
