@@ -4,13 +4,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from crowd.scenario.table import Coordinate, Positive, Table, refuse
+from crowd.scenario.table import Coordinate, Number, Positive, Table, WholeNumber, YesOrNo, refuse
 
-Length = Annotated[float, Field(ge=0.002, le=5.0)]
-Place = tuple[Coordinate, Annotated[float, Field(ge=0.0, le=100.0)], Coordinate]
-Tint = Annotated[float, Field(ge=0.0, le=1.0)]
-RowCount = Annotated[int, Field(ge=1, le=1000)]
-Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
+Length = Annotated[Number, Field(ge=0.002, le=5.0)]
+Place = tuple[Coordinate, Annotated[Number, Field(ge=0.0, le=100.0)], Coordinate]
+Tint = Annotated[Number, Field(ge=0.0, le=1.0)]
+RowCount = Annotated[WholeNumber, Field(ge=1, le=1000)]
+Angle = Annotated[Number, Field(ge=-360.0, le=360.0)]
 
 SIZE_KEYS = {
     "sphere": ("radius",),
@@ -61,7 +61,7 @@ class ObjectTable(Table):
     """Metres per unit of the mesh file."""
     position: Place
     """Its centre x, y, z, m; for meshes the centre of the bounding box."""
-    resting: bool = False
+    resting: YesOrNo = False
     """It rests on a surface: y of `position` is the height of that surface."""
     rotation: Annotated[tuple[Angle, Angle, Angle], BeforeValidator(_turn_of_number)] = (0.0, 0.0, 0.0)
     """Turn about x, then z, then y (the heading), degrees, written [x, y, z]; one number is the heading."""

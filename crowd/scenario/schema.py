@@ -14,19 +14,29 @@ from crowd.errors import SettingsError, nearest_first
 from crowd.navigation.avoidance import AvoidanceSettings
 from crowd.scenario.object_table import ObjectTable
 from crowd.scenario.source import ScenarioSource
-from crowd.scenario.table import Coordinate, NotNegative, Point, Positive, Table, refuse
+from crowd.scenario.table import (
+    Coordinate,
+    NotNegative,
+    Number,
+    Point,
+    Positive,
+    Table,
+    WholeNumber,
+    YesOrNo,
+    refuse,
+)
 from crowd.scenario.task_table import TaskTable
 
 DEFAULT_DT = 1.0 / 60.0
 
-Share = Annotated[float, Field(gt=0.0, le=1.0)]
-BodyRadius = Annotated[float, Field(ge=0.1, le=2.0)]
-Speed = Annotated[float, Field(gt=0.0, le=8.0)]
-Stature = Annotated[float, Field(ge=1.0, le=2.3)]
-BoardHeight = Annotated[float, Field(gt=0.0, le=2.5)]
+Share = Annotated[Number, Field(gt=0.0, le=1.0)]
+BodyRadius = Annotated[Number, Field(ge=0.1, le=2.0)]
+Speed = Annotated[Number, Field(gt=0.0, le=8.0)]
+Stature = Annotated[Number, Field(ge=1.0, le=2.3)]
+BoardHeight = Annotated[Number, Field(gt=0.0, le=2.5)]
 OnArrival = Literal["stay", "leave"]
 Attention = Literal["listening", "talking", "thinking", "none"]
-Altitude = Annotated[float, Field(ge=0.0, le=1000.0)]
+Altitude = Annotated[Number, Field(ge=0.0, le=1000.0)]
 
 
 class Area(Table):
@@ -50,7 +60,7 @@ class Circle(Table):
     """A circle on the ground."""
 
     center: Point
-    radius: Annotated[float, Field(gt=0.0, le=1000.0)]
+    radius: Annotated[Number, Field(gt=0.0, le=1000.0)]
     """m, > 0."""
 
 
@@ -60,11 +70,11 @@ class Spread(Table):
     A plain number means the same for all.
     """
 
-    min: float | None = None
+    min: Number | None = None
     """Lower bound."""
-    max: float | None = None
+    max: Number | None = None
     """Upper bound."""
-    mean: float | None = None
+    mean: Number | None = None
     """Centre of a bell curve; needs `deviation`."""
     deviation: Positive | None = None
     """Standard deviation, > 0; values beyond 2.5 of them are redrawn."""
@@ -173,7 +183,7 @@ class Box(TimedObstacle):
     boards: Annotated[tuple[BoardHeight, ...], Field(max_length=20)] = ()
     """Heights of the upper sides of its boards, ascending, m: furniture such as a shelf, a table or a stool,
     with objects on it. Solid when left out."""
-    facing: float | None = None
+    facing: Number | None = None
     """Direction in which people sit on the lowest board, degrees; no seat when left out."""
 
     @model_validator(mode="after")
@@ -247,7 +257,7 @@ class GoalList(Table):
     """Done one after the other; without goals people stand."""
     tasks: tuple[TaskTable, ...] = ()
     """Instead of goals: what they do, one thing after the other."""
-    repeat: bool = False
+    repeat: YesOrNo = False
     """Start again with the first goal or task after the last."""
     gestures: tuple[str, ...] = ()
     """Clips of the motion library that are played now and then, in random order."""
@@ -256,7 +266,7 @@ class GoalList(Table):
     character: CharacterFiles = ()
     """Skinned glTF file that they are drawn and exported as, beside the scenario; or a list, from which each
     person draws one. ``"built-in"`` is the engine's own body."""
-    glances: bool = True
+    glances: YesOrNo = True
     """Now and then look at people who come near."""
     look_at: tuple[Coordinate, Altitude, Coordinate] | None = None
     """Point [x, y, z] that they look at from the start, m."""
@@ -278,7 +288,7 @@ class Character(GoalList):
 
     position: Point
     """Start, m."""
-    facing: float | None = None
+    facing: Number | None = None
     """Heading at the start, degrees; towards the first goal when left out."""
     radius: BodyRadius = 0.25
     """Body disc, m."""
@@ -293,7 +303,7 @@ class Character(GoalList):
 class Region(GoalList):
     """Many people at random places of an area, or around a circle."""
 
-    count: Annotated[int, Field(ge=1, le=200_000)]
+    count: Annotated[WholeNumber, Field(ge=1, le=200_000)]
     """Number of people; `characters` of a run scales it."""
     area: Area | None = None
     """Where they start."""
@@ -303,7 +313,7 @@ class Region(GoalList):
     """In an area: anywhere, or on a loose grid, which also fills dense crowds."""
     spacing: NotNegative = 0.1
     """Least gap between bodies at the start, m."""
-    facing: Annotated[float | Literal["goal", "random", "center"], _one_of("goal", "random", "center")] = (
+    facing: Annotated[Number | Literal["goal", "random", "center"], _one_of("goal", "random", "center")] = (
         "goal"
     )
     """Degrees, or towards the first goal, anywhere, or towards the centre of the place."""
@@ -328,15 +338,15 @@ class Flow(GoalList):
 
     source: Area
     """Where they appear; a person waits outside while the place is taken."""
-    rate: Annotated[float, Field(gt=0.0, le=1000.0)]
+    rate: Annotated[Number, Field(gt=0.0, le=1000.0)]
     """People per second."""
     start_at: NotNegative = 0.0
     """Time of the first person, s."""
-    limit: Annotated[int, Field(ge=1, le=200_000)] | None = None
+    limit: Annotated[WholeNumber, Field(ge=1, le=200_000)] | None = None
     """People in all; no end when left out."""
-    most_present: Annotated[int, Field(ge=1, le=20_000)] = 100
+    most_present: Annotated[WholeNumber, Field(ge=1, le=20_000)] = 100
     """Most people of this flow in the scene at once."""
-    facing: Annotated[float | Literal["goal"], _one_of("goal")] = "goal"
+    facing: Annotated[Number | Literal["goal"], _one_of("goal")] = "goal"
     """Heading at the start, degrees, or towards the first goal."""
     radius: RadiusSpread = ADULT_RADIUS
     speed: SpeedSpread = ADULT_SPEED
@@ -361,8 +371,8 @@ class Play(Table):
 class Bound(Table):
     """Bounds of one metric."""
 
-    min: float | None = None
-    max: float | None = None
+    min: Number | None = None
+    max: Number | None = None
 
     @model_validator(mode="after")
     def _is_a_range(self) -> "Bound":
@@ -405,9 +415,9 @@ class Scenario(Table):
 
     name: str = "scenario"
     description: str = ""
-    seconds: Annotated[float, Field(gt=0.0, le=86_400.0)] = 30.0
+    seconds: Annotated[Number, Field(gt=0.0, le=86_400.0)] = 30.0
     """Length of a run when none is asked for, s, > 0."""
-    dt: Annotated[float, Field(ge=1.0 / 240.0, le=0.1)] = DEFAULT_DT
+    dt: Annotated[Number, Field(ge=1.0 / 240.0, le=0.1)] = DEFAULT_DT
     """Length of one step, s, 1/240 to 0.1."""
     world: WorldTable
     characters: tuple[Character, ...] = ()

@@ -5,10 +5,14 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+# Text in quotes and true are no numbers, though pydantic would make some of them.
+Number = Annotated[float, Field(strict=True)]
+WholeNumber = Annotated[int, Field(strict=True)]
+YesOrNo = Annotated[bool, Field(strict=True)]
+Coordinate = Annotated[Number, Field(ge=-10_000.0, le=10_000.0)]
 Point = tuple[Coordinate, Coordinate]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[Number, Field(gt=0.0)]
+NotNegative = Annotated[Number, Field(ge=0.0)]
 
 
 class Table(BaseModel):

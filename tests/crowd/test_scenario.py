@@ -70,6 +70,21 @@ def test_a_valid_file_is_read_with_defaults(tmp_path: Path) -> None:
         ),
         (
             'name = "anna"',
+            'radius = "0.3"',
+            "scene.toml: line 8: characters[0].radius: must be a number; got '0.3'; allowed a number",
+        ),
+        (
+            'name = "anna"',
+            "speed = true",
+            "scene.toml: line 8: characters[0].speed: must be a number; got 'true'; allowed a number",
+        ),
+        (
+            'name = "anna"',
+            "glances = 1",
+            "scene.toml: line 8: characters[0].glances: must be true or false; got 1; allowed true or false",
+        ),
+        (
+            'name = "anna"',
             'radius = "wide"',
             "scene.toml: line 8: characters[0].radius: must be a number; got 'wide'; allowed a number",
         ),
