@@ -1,4 +1,8 @@
-"""Vectors and rotations that programs give to commands, checked."""
+"""Vectors, rotations, times and seeds that programs give, checked."""
+
+import math
+import operator
+from typing import SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
@@ -63,3 +67,40 @@ def rotations_of(what: str, value: npt.ArrayLike, count: int) -> npt.NDArray[np.
     if not (length > 0.0).all():
         raise SettingsError(describe(what, "rotation has no length", [0.0] * 4, "(w, x, y, z)"))
     return np.asarray(quaternion / length)
+
+
+LONGEST = 86_400.0
+"""Longest run, s."""
+LARGEST_SEED = 2**63 - 1
+
+
+def checked_seed(value: SupportsIndex) -> int:
+    """Read the key of random choices.
+
+    Raises
+    ------
+    SettingsError
+        It is no whole number of 64 bits.
+    """
+    try:
+        seed = operator.index(value)
+    except TypeError:
+        raise SettingsError(describe("seed", "is no whole number", str(value), "a whole number")) from None
+    if not -LARGEST_SEED - 1 <= seed <= LARGEST_SEED:
+        raise SettingsError(
+            describe("seed", "is out of range", seed, f"{-LARGEST_SEED - 1} to {LARGEST_SEED}")
+        )
+    return seed
+
+
+def require_seconds(what: str, seconds: float) -> None:
+    """Refuse a length of time that cannot be simulated.
+
+    Raises
+    ------
+    SettingsError
+        It is no number, below 0, or longer than a day.
+    """
+    is_number = isinstance(seconds, int | float | np.number) and math.isfinite(seconds)
+    if not is_number or not 0.0 <= seconds <= LONGEST:
+        raise SettingsError(describe(what, "seconds are out of range", seconds, f"0 to {LONGEST:g} s"))

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from crowd import checkpoint
+from crowd.arguments import checked_seed, require_seconds
 from crowd.checkpoint import Stateful
 from crowd.commands import Commands
 from crowd.controllers.animation import Animation
@@ -25,7 +26,7 @@ from crowd.controllers.locomotion import Locomotion
 from crowd.controllers.reach import Reach
 from crowd.controllers.sitting import Sitting
 from crowd.controllers.world_offset import WorldOffset
-from crowd.errors import SettingsError, describe
+from crowd.errors import SettingsError, describe, nearest_first
 from crowd.joints import Joints
 from crowd.metrics import Metrics
 from crowd.model import Model
@@ -38,6 +39,7 @@ from crowd.tasks import Events, Refusals, Tasks
 from crowd.world.objects import ObjectState
 from crowd_kernels import _jit
 
+BODIES = ("people", "discs")
 SERIAL_BELOW = 200
 STAGES = ("perceive", "decide", "navigate", "steer", "locomote", "animate", "settle", "record")
 
@@ -95,8 +97,13 @@ class Simulation:
         bodies: Literal["people", "discs"] = "people",
         is_threaded: bool | None = None,
     ) -> None:
+        if not isinstance(scenario, Scenario):
+            allowed = "what crowd.load_scenario returns"
+            raise SettingsError(describe("scenario", "is no scenario", repr(scenario), allowed))
+        if bodies not in BODIES:
+            raise SettingsError(describe("bodies", "is unknown", bodies, nearest_first(str(bodies), BODIES)))
         self.scenario = scenario
-        self.seed = seed
+        self.seed = seed = checked_seed(seed)
         self.bodies = bodies
         self.dt = scenario.dt
         self.step_index = 0
@@ -105,7 +112,8 @@ class Simulation:
         )
         capacity = self.model.capacity
         is_threaded = capacity >= SERIAL_BELOW if is_threaded is None else is_threaded
-        self.threads = thread_count(threads) if is_threaded else 1
+        wanted = thread_count(threads)
+        self.threads = wanted if is_threaded else 1
         _jit.set_thread_count(self.threads)
         self.state = State.create(capacity)
         self.objects = ObjectState(self.model.objects)
@@ -194,7 +202,15 @@ class Simulation:
         return frame
 
     def run(self, seconds: float | None = None) -> Iterator[Frame]:
-        """Step for `seconds` of simulated time; without it, until everyone has finished."""
+        """Step for `seconds` of simulated time; without it, until everyone has finished.
+
+        Raises
+        ------
+        SettingsError
+            It is no time, or too long.
+        """
+        if seconds is not None:
+            require_seconds("run", seconds)
         last = None if seconds is None else self.step_index + round(seconds / self.dt)
         while not self.is_finished if last is None else self.step_index < last:
             yield self.step()

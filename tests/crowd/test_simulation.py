@@ -228,6 +228,42 @@ def test_bad_commands_get_one_clear_line(call, error, message):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        (
+            {"seed": 2**70},
+            "seed: is out of range; got 1180591620717411303424; allowed -9223372036854775808 to",
+        ),
+        ({"seed": "a"}, "seed: is no whole number; got 'a'; allowed a whole number"),
+        ({"seed": 1.5}, "seed: is no whole number; got '1.5'"),
+        ({"bodies": "disks"}, 'bodies: is unknown; got \'disks\'; allowed "discs", "people"'),
+        ({"threads": 0}, "threads: is out of range; got 0; allowed 1 to"),
+        (
+            {"scenario": "plaza"},
+            "scenario: is no scenario; got \"'plaza'\"; allowed what crowd.load_scenario",
+        ),
+    ],
+)
+def test_wrong_arguments_of_a_simulation_are_one_line(how, message):
+    scenario = how.pop("scenario", Scenario(world=GROUND, characters=(walker(),)))
+    with pytest.raises(SettingsError) as caught:
+        crowd.Simulation(scenario, **how)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), -1.0, 1e9, "1", None])
+def test_a_length_that_cannot_be_run_is_refused(seconds):
+    simulation = crowd.Simulation(Scenario(world=GROUND, characters=(walker(),)))
+    if seconds is None:
+        assert not list(simulation.run(seconds=0.0))
+        return
+    with pytest.raises(SettingsError, match=r"run: seconds are out of range; got .*; allowed 0 to 86400 s"):
+        next(simulation.run(seconds=seconds))
+    assert simulation.time == 0.0
+
+
 def test_joints_hang_together_and_rotations_are_unit():
     simulation = run_one(walker(), 2.0)
     skeleton = simulation.model.skeleton
