@@ -37,11 +37,14 @@ def frames(
         return 0
     from crowd.bench.frames import SCENES, SIZES, compile_kernels, measure_frames
     from crowd.bench.machine import describe_machine
+    from crowd.bench.plot import draw, require_matplotlib
     from crowd.bench.report import print_controllers, print_frames, read_results, write_results
 
     chosen = choose_scenes(scenes, SCENES)
     sizes = choose_sizes(characters) or list(SIZES)
     earlier = read_results(compare) if compare is not None else []
+    if plot is not None:
+        require_matplotlib("--plot")
     console = Console(stderr=True)
     machine = describe_machine()
     with console.status("compiling kernels (first run only)"):
@@ -61,8 +64,6 @@ def frames(
     if json is not None:
         write_results(json, rows)
     if plot is not None:
-        from crowd.bench.plot import draw
-
         draw(rows, machine, plot)
     for line in regressions:
         print(line)

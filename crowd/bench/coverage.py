@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crowd.bench.plot import require_matplotlib
 from crowd.blending.parameter_space import ParameterSpace
 from crowd.errors import SettingsError, describe
 from crowd.motion.clip import Clip, ClipKind
@@ -41,12 +42,9 @@ def draw_coverage(library: MotionLibrary, path: Path) -> None:
     SettingsError
         Matplotlib is missing, or the picture cannot be written.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise SettingsError(
-            describe("--picture", "matplotlib is not installed", allowed='pip install "crowd-engine[bench]"')
-        ) from error
+    require_matplotlib("--picture")
+    from matplotlib.figure import Figure
+
     clips = library.of_kind(ClipKind.LOCOMOTION)
     points = np.array([clip.parameters for clip in clips])
     durations = np.array([clip.cycle_duration for clip in clips])

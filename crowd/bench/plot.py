@@ -1,6 +1,7 @@
 """Frame rate against number of characters, drawn as in the paper, with the paper's own figures in it."""
 
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,24 @@ PAPER_CHARACTERS = 20
 """Number of characters up to which the paper states real-time performance."""
 
 
+def require_matplotlib(option: str) -> None:
+    """Refuse to draw where matplotlib is missing, before a long run begins.
+
+    Parameters
+    ----------
+    option : str
+        What asks for the picture, for the message.
+
+    Raises
+    ------
+    SettingsError
+        matplotlib is not installed.
+    """
+    if find_spec("matplotlib") is None:
+        allowed = 'pip install "crowd-engine[bench]"'
+        raise SettingsError(describe(option, "matplotlib is not installed", allowed=allowed))
+
+
 def draw(rows: Sequence[Mapping[str, Any]], machine: Mapping[str, Any], path: Path) -> None:
     """Draw results to a picture file.
 
@@ -28,15 +47,12 @@ def draw(rows: Sequence[Mapping[str, Any]], machine: Mapping[str, Any], path: Pa
     SettingsError
         matplotlib is not installed, or the file cannot be written.
     """
-    try:
-        import matplotlib
+    require_matplotlib("--plot")
+    import matplotlib
 
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
-    except ImportError as error:
-        raise SettingsError(
-            describe("--plot", "needs matplotlib", allowed='pip install "crowd-engine[bench]"')
-        ) from error
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
     figure, axes = plt.subplots(figsize=(7.5, 5.0), layout="constrained")
     for case in dict.fromkeys(row["case"] for row in rows):
         points = sorted((row["characters"], row["fps"]) for row in rows if row["case"] == case)

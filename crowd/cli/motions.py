@@ -55,6 +55,7 @@ def import_(
     from rich.console import Console
     from rich.progress import Progress
 
+    from crowd.bench.plot import require_matplotlib
     from crowd.cli.output import require_folder
     from crowd.motion.importing import labels as label_files
     from crowd.motion.importing.folder import Request, import_motions
@@ -63,6 +64,8 @@ def import_(
 
     for option, path in (("--out", out), ("--write-labels", write_labels), ("--picture", picture)):
         require_folder(option, path)
+    if picture is not None:
+        require_matplotlib("--picture")
     if frame_rate is not None and not 1.0 <= frame_rate <= 1000.0:
         raise SettingsError(describe("--frame-rate", "is out of range", frame_rate, "1 to 1000 Hz"))
     request = Request(

@@ -22,6 +22,7 @@ from crowd.scenario.schema import Bound
         (["run", "plaza", "--seconds", "soon"], "crowd: Invalid value for '--seconds'"),
         (["run", "plaza", "--seconds", "-1"], "--seconds: is out of range; got -1.0; allowed > 0 to 86400"),
         (["run", "plaza", "--seconds", "nan"], "--seconds: is out of range; got nan; allowed > 0 to 86400"),
+        (["run", "plaza", "--seed", "9" * 20], f"seed: is out of range; got {'9' * 20}; allowed -922"),
         (["run", "plaza", "--characters", "0"], "crowd: Invalid value for '--characters'"),
         (["run", "plaza", "--threads", "0"], "crowd: Invalid value for '--threads'"),
         (["run", "plaza", "--motionz", "x"], "crowd: No such option: --motionz"),
@@ -122,6 +123,23 @@ def test_benchmarks_are_part_of_the_command_line(capsys: pytest.CaptureFixture[s
     assert exit_code(["bench", "--scenes", "nowhere"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "'nowhere'" in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (["bench", "--plot", "fps.png"], "--plot"),
+        (["motions", "import", "clips", "--out", "mine.h5", "--picture", "mine.png"], "--picture"),
+    ],
+)
+def test_a_missing_matplotlib_is_told_before_the_work(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str], option: str
+) -> None:
+    monkeypatch.setattr("crowd.bench.plot.find_spec", lambda name: None)
+    monkeypatch.setattr("crowd.bench.frames.compile_kernels", lambda threads: pytest.fail("it has begun"))
+    assert exit_code(arguments) == 2
+    expected = f'{option}: matplotlib is not installed; allowed pip install "crowd-engine[bench]"\n'
+    assert capsys.readouterr().err == expected
 
 
 def test_help_names_every_option(capsys: pytest.CaptureFixture[str]) -> None:
