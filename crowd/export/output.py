@@ -17,8 +17,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     Raises
     ------
     RecordingError
-        The file cannot be written.
+        The file cannot be written, or `path` is a folder.
     """
+    if path.is_dir():
+        raise RecordingError(describe(str(path), "is a folder", allowed="the name of a file"))
     unfinished = path.with_name(f".part_{path.name}")
     try:
         yield unfinished
@@ -42,7 +44,8 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """
     if path.exists() and not path.is_dir():
         raise RecordingError(describe(str(path), "is a file", allowed="a folder: there is one file a person"))
-    unfinished = path.with_name(f".part_{path.name}")
+    # A folder that is there already need not have a name: "." and "/" have none.
+    unfinished = (path if path.is_dir() else path.parent) / f".part_{path.name}"
     try:
         shutil.rmtree(unfinished, ignore_errors=True)
         unfinished.mkdir(parents=True)

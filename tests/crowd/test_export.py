@@ -349,6 +349,16 @@ def test_bad_requests_get_one_line(plaza, tmp_path):
     with pytest.raises(RecordingError, match="is a file"):
         export(Selection(plaza, [0]), "bvh", tmp_path / "taken")
     assert (tmp_path / "taken").read_text() == "mine"
+    for place in (tmp_path, Path()):
+        with pytest.raises(RecordingError, match="is a folder; allowed the name of a file"):
+            export(Selection(plaza), "npz", place)
+
+
+def test_a_folder_that_is_there_takes_the_files_of_people(plaza, tmp_path, monkeypatch):
+    (tmp_path / "other.txt").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    export(Selection(plaza, [0]), "bvh", Path())
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["other.txt", "person_0000.bvh"]
 
 
 def test_the_command_line_exports_every_format(plaza, tmp_path):
