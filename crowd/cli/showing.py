@@ -112,22 +112,43 @@ def view(
     from crowd.cli.output import require_folder
 
     require_folder("--record", record)
+    _require_trajectories(shown, record)
     with _opened(shown, record, character or []) as opened:
+        if record is not None:
+            print(f"wrote {record}")
         if picture is None and video is None and not is_window:
             return 0
         if picture is not None:
             from crowd_viewer.picture import render, write_picture
 
             write_picture(picture, render(opened, time=time, camera=chosen))
+            print(f"wrote {picture}")
         if video is not None:
             from crowd_viewer.video import film_recording
 
             film_recording(opened, video, camera=chosen, start=start, stop=stop)
+            print(f"wrote {video}")
         if is_window:
             from crowd_viewer.window import show
 
             show(opened, camera=chosen)
     return 0
+
+
+def _require_trajectories(path: Path, record: Path | None) -> None:
+    """Refuse to make a recording of a recording.
+
+    Raises
+    ------
+    SettingsError
+        One is asked for.
+    """
+    from crowd.errors import SettingsError, describe
+    from crowd.trajectories.opening import is_recording
+
+    if record is not None and is_recording(path):
+        what = "is for trajectories of other programs"
+        raise SettingsError(describe("--record", what, f"the recording {path}", "--picture or --video"))
 
 
 def _opened(path: Path, record: Path | None, character_files: list[Path]) -> Recording:

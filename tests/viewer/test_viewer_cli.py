@@ -21,7 +21,7 @@ def test_wrong_files_are_refused_before_the_run(drawing, capsys):
         assert capsys.readouterr().err.startswith(expected)
 
 
-def test_a_run_leaves_a_picture_a_video_and_a_recording_to_view(drawing, tmp_path):
+def test_a_run_leaves_a_picture_a_video_and_a_recording_to_view(drawing, tmp_path, capsys):
     pytest.importorskip("imageio_ffmpeg")
     image = pytest.importorskip("PIL.Image")
     imageio = pytest.importorskip("imageio.v3")
@@ -41,6 +41,22 @@ def test_a_run_leaves_a_picture_a_video_and_a_recording_to_view(drawing, tmp_pat
     command = ["view", recording, "--picture", replay, "--time", 0.2, "--camera", camera]
     assert exit_code([str(argument) for argument in command]) == 0
     assert np.asarray(image.open(replay)).std() > 15
+    assert capsys.readouterr().out.endswith(f"wrote {replay}\n")
+    for arguments, asked in (
+        (["--picture", tmp_path / "c.png", "--time", 7], "7 s"),
+        (["--picture", tmp_path / "c.png", "--time", -1], "-1 s"),
+        (["--picture", tmp_path / "c.png", "--time", "nan"], "nan s"),
+        (["--video", tmp_path / "c.mp4", "--start", 5, "--stop", 9], "5 to 9 s"),
+    ):
+        assert exit_code([str(argument) for argument in ["view", recording, *arguments]]) == 2
+        expected = f"{recording}: has no such time; got '{asked}'; allowed 0.03 to 0.50 s\n"
+        assert capsys.readouterr().err == expected
+        assert not list(tmp_path.glob("*c.*"))
+    for time in (0.0, 0.51):
+        assert exit_code([str(a) for a in ["view", recording, "--picture", replay, "--time", time]]) == 0
+    assert exit_code([str(a) for a in ["view", recording, "--record", tmp_path / "c.h5"]]) == 2
+    expected = "--record: is for trajectories of other programs; got 'the recording "
+    assert capsys.readouterr().err.startswith(expected)
 
 
 def test_the_viewer_is_loaded_only_when_something_is_shown():

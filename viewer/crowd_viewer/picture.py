@@ -11,7 +11,7 @@ import numpy.typing as npt
 from crowd.errors import describe
 from crowd_viewer.camera import Camera
 from crowd_viewer.context import INSTALL, ViewerError, headless_context
-from crowd_viewer.frame import Scene, Shown, source_of
+from crowd_viewer.frame import ReplaySource, Scene, Shown, Source, source_of
 from crowd_viewer.quality import FINE, Quality
 from crowd_viewer.renderer import Renderer
 
@@ -63,10 +63,10 @@ def render(
     Raises
     ------
     ViewerError
-        There is no OpenGL; the message says what to install.
+        There is no OpenGL; the message says what to install. Or the recording has no such time.
     """
     source = source_of(shown)
-    frame = source.frame(time)
+    frame = source.frame(_moment(source, time))
     chosen = camera or default_camera(source.scene, frame.places, size)
     with Renderer(headless_context(), source.scene, size, quality) as renderer:
         renderer.draw(frame, chosen, keeps_levels=False)
@@ -85,10 +85,27 @@ def render_identities(
     Parameters are those of `render`.
     """
     source = source_of(shown)
-    frame = source.frame(time)
+    frame = source.frame(_moment(source, time))
     chosen = camera or default_camera(source.scene, frame.places, size)
     with Renderer(headless_context(), source.scene, size) as renderer:
         return renderer.identities(frame, chosen)
+
+
+def _moment(source: Source, time: float | None) -> float | None:
+    """Moment of a recording that is asked for, if it has such a moment.
+
+    A run is asked for from its beginning on, though the first frame is recorded a little later; likewise up
+    to the frame that would have followed the last one.
+    """
+    if time is None or not isinstance(source, ReplaySource):
+        return time
+    times = source.recording.time
+    first, last = float(times[0]), float(times[-1])
+    gap = (last - first) / max(len(times) - 1, 1)
+    if not min(first, 0.0) <= time <= last + gap:
+        what, allowed = f"{time:g} s", f"{first:.2f} to {last:.2f} s"
+        raise ViewerError(describe(str(source.recording.path), "has no such time", what, allowed))
+    return time
 
 
 def default_camera(scene: Scene, places: FloatArray, size: tuple[int, int]) -> Camera:

@@ -180,7 +180,8 @@ def film_recording(
     first, last = float(recording.time[0]), float(recording.time[-1])
     begin, end = max(first, first if start is None else start), min(last, last if stop is None else stop)
     if end < begin:
-        got, allowed = f"{begin:g} to {end:g} s", f"{first:.2f} to {last:.2f} s"
+        got = f"{first if start is None else start:g} to {last if stop is None else stop:g} s"
+        allowed = f"{first:.2f} to {last:.2f} s"
         raise ViewerError(describe(str(recording.path), "has no such time", got, allowed))
     times = np.arange(begin, end + 1e-6, 1.0 / frames_per_second)
     chosen = camera or default_camera(source.scene, source.places(begin, end), size)
