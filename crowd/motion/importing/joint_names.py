@@ -357,7 +357,7 @@ def map_joints(names: Sequence[str], where: str) -> JointMap:
             describe(
                 f"{where}: joint names",
                 f"no joint for {', '.join(missing)} (nearest family: {family.name}); "
-                "name them in a mapping file, see --joints",
+                "name them in a mapping file: --joints, or NAME.joints.toml beside a character",
                 allowed=f"like {nearest_first(wanted, names)}",
             )
         )
