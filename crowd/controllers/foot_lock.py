@@ -8,7 +8,8 @@ import numpy.typing as npt
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.state import ByteArray, Float32Array, FloatArray, IntArray
 from crowd_kernels.aligned import aligned_zeros
-from crowd_kernels.foot_lock import LegArrays, LockLimits, lock_feet_crowd
+from crowd_kernels.foot_lock import LegArrays, lock_feet_crowd
+from crowd_kernels.foot_plan import LockLimits
 
 HEEL_BEHIND_ANKLE = 0.035
 """Heel contact behind the ankle, over stature (Winter: foot length 0.152, ankle at a quarter of it)."""
@@ -136,6 +137,7 @@ def leg_arrays(skeleton: Skeleton) -> LegArrays:
         joints,
         np.ascontiguousarray(skeleton.offset[joints]),
         np.ascontiguousarray(skeleton.segment[joints].astype(np.int32)),
+        np.linalg.norm(skeleton.offset[joints], axis=-1),
         sole,
         int(Segment.LEG),
         int(Segment.FOOT),

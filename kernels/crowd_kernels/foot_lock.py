@@ -6,19 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
-from crowd_kernels.gait import HEEL, SWING
-from crowd_kernels.limb_ik import bend_rotations, turned
-from crowd_kernels.locomotion import ease, wrapped_angle
+from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
+from crowd_kernels.foot_plan import LockLimits, plan_foot
+from crowd_kernels.gait import HEEL
+from crowd_kernels.limb_ik import bend_rotations
+from crowd_kernels.pelvis_drop import lower_pelvis, needed_drop
 from crowd_kernels.pose import joint_rotation, set_joint_rotation
-from crowd_kernels.quaternion import Quaternion, conjugate, from_yaw, multiply, normalized, rotate
-from crowd_kernels.vector import Vector, add, norm, subtract
+from crowd_kernels.quaternion import Quaternion, conjugate, from_yaw, multiply, rotate
+from crowd_kernels.vector import Vector, add, subtract
 
 CHUNKS = 32
-TWO = np.float64(2.0)
-UNKNOWN, NEITHER, FIRST_LEG = 0, 1, 2
-"""What decides how far the pelvis is lowered: not known yet, no leg, or from here on one of the legs."""
-TINY = 1e-12
 LOWEST = 0.12
 """How far the pelvis is lowered at most, m at leg scale 1."""
 
@@ -32,6 +29,8 @@ class LegArrays(NamedTuple):
     """(2, 4, 3) Their rest offsets, m."""
     segment: npt.NDArray[np.int32]
     """(2, 4) Columns of the proportions that stretch the offsets."""
+    length: npt.NDArray[np.float64]
+    """(2, 4) Lengths of the offsets, m."""
     sole: npt.NDArray[np.float64]
     """(2, 3, 3) Heel, ball and tip on the sole: heel and ball in the foot's frame, tip in the toe's, m."""
     leg_segment: int
@@ -40,23 +39,45 @@ class LegArrays(NamedTuple):
     """Column that stretches the sole."""
 
 
-class LockLimits(NamedTuple):
-    """When feet are let go, and how fast they find back."""
+class PlannedLeg(NamedTuple):
+    """A leg in the animation, and where its foot is to go; root frame, vectors in m."""
 
-    release_distance: float
-    """Offset of a planted foot from its animation at which it is let go, m at leg scale 1."""
-    release_yaw: float
-    """Turn of a planted foot against its animation at which it starts to pivot, rad."""
-    stretch: float
-    """Largest share of the leg's length that is used."""
-    swing_rate: float
-    """Rate at which the offset fades while the foot swings, 1/s."""
-    ground_rate: float
-    """Rate at which the height of a planted foot is corrected, 1/s."""
-    pelvis_speed: float
-    """Speed up to which the pelvis follows at once what a leg needs, m/s at leg scale 1."""
-    pelvis_rate: float
-    """Rate at which it follows what goes beyond, and settles when another leg decides, 1/s."""
+    hip: Vector
+    thigh_bone: Vector
+    """From hip to knee."""
+    shank_bone: Vector
+    """From knee to ankle."""
+    heel: Vector
+    """From the ankle."""
+    ball: Vector
+    """From the ankle."""
+    thigh: Quaternion
+    shank: Quaternion
+    foot: Quaternion
+    """As it is to be turned, like heel and ball."""
+    ankle: Vector
+    """Where it is to go."""
+    drop: float
+    """How far the pelvis must come down for that, m."""
+
+
+@inlined_kernel
+def unit_rotation(pose_row: Any, joint: int) -> Quaternion:
+    """Read the rotation of a joint, and bring it from float32 to unit length in float64.
+
+    Its length is 1 up to float32's rounding, so that one of Newton's steps makes it exact, and products of
+    such rotations stay of unit length.
+    """
+    w, x, y, z = joint_rotation(pose_row, joint)
+    w, x, y, z = np.float64(w), np.float64(x), np.float64(y), np.float64(z)
+    scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
+    return w * scale, x * scale, y * scale, z * scale
+
+
+@inlined_kernel
+def turned_about_y(cosine: float, sine: float, v: Vector) -> Vector:
+    """Turn a vector about +y, by an angle of which cosine and sine are known."""
+    return cosine * v[0] + sine * v[2], v[1], cosine * v[2] - sine * v[0]
 
 
 @inlined_kernel
@@ -67,30 +88,34 @@ def scaled_offset(legs: LegArrays, leg: int, part: int, scale: Any) -> Vector:
 
 
 @inlined_kernel
+def bone_length(legs: LegArrays, leg: int, part: int, scale: Any) -> float:
+    """Find the length of a leg bone in a character's own proportions, m."""
+    return float(legs.length[leg, part]) * float(scale[legs.segment[leg, part]])
+
+
+@inlined_kernel
 def sole_point(legs: LegArrays, leg: int, point: int, scale: Any) -> Vector:
     """Find a point of the sole in a character's own proportions: 0 heel, 1 ball, 2 tip."""
     s = float(scale[legs.foot_segment])
     return legs.sole[leg, point, 0] * s, legs.sole[leg, point, 1] * s, legs.sole[leg, point, 2] * s
 
 
-@kernel
-def heading_of(q: Quaternion) -> float:
-    """Find the heading of a rotated z axis on the ground, rad."""
-    return math.atan2(TWO * (q[1] * q[3] + q[0] * q[2]), 1.0 - TWO * (q[1] * q[1] + q[2] * q[2]))
-
-
 @inlined_kernel
-def plan_foot(
+def plan_leg(
     character: int,
     leg: int,
-    wanted: int,
-    heel: Vector,
-    ball: Vector,
-    tip: Vector,
-    heading: float,
-    leg_scale: float,
+    legs: LegArrays,
     limits: LockLimits,
+    scale: Any,
+    place: Vector,
+    yaw: float,
+    cosine: float,
+    sine: float,
+    pelvis: Vector,
+    pelvis_rotation: Quaternion,
+    wanted: int,
     dt: float,
+    row: Any,
     contact: Any,
     is_released: Any,
     anchor: Any,
@@ -99,198 +124,137 @@ def plan_foot(
     offset_rate: Any,
     yaw_offset: Any,
     yaw_offset_rate: Any,
-) -> None:
-    """Decide where one foot goes: `offset` and `yaw_offset` of its animation, in place.
+) -> PlannedLeg:
+    """Find a leg in the animation, and decide where its foot goes.
 
     Parameters
     ----------
-    character, leg : int
-        Row, and 0 right or 1 left.
-    wanted : int
-        Contact that the gait wants: 0 swing, 1 heel, 2 ball.
-    heel, ball, tip : tuple of float
-        Points of the sole in the animation, world, m.
-    heading : float
-        Heading of the foot in the animation, world, rad.
-    leg_scale : float
-        Scale of the character's legs.
-    limits : LockLimits
-    dt : float
-        s.
-    contact : (N, 2) uint8
-        In and out: contact in force.
-    is_released : (N, 2) bool
-        In and out: let go early; the foot is free until the gait lifts it.
-    anchor : (N, 2, 2) float64
-        In and out: x, z of the planted point, m.
-    anchor_yaw : (N, 2) float64
-        In and out: heading of the planted foot, rad.
-    offset, offset_rate : (N, 2, 3) float64
-        In and out: correction of the foot's place, world, m and m/s.
-    yaw_offset, yaw_offset_rate : (N, 2) float64
-        In and out: correction of its heading, rad and rad/s.
-    """
-    if wanted == SWING:
-        is_released[character, leg] = False
-    elif is_released[character, leg]:
-        wanted = SWING
-    point = heel if wanted == HEEL else ball
-    before = (offset[character, leg, 0], offset[character, leg, 1], offset[character, leg, 2])
-    yaw_before = yaw_offset[character, leg]
-    if wanted != SWING:
-        if contact[character, leg] == SWING:
-            anchor_yaw[character, leg] = heading + yaw_before
-        if wanted != contact[character, leg]:
-            # The heel lies behind the ball along the foot, which the yaw correction turns about the anchor.
-            turn = from_yaw(yaw_before)
-            old = heel if contact[character, leg] == HEEL else ball
-            arm = rotate(turn, subtract(point, old))
-            base = add(old, before) if contact[character, leg] != SWING else add(point, before)
-            if contact[character, leg] != SWING:
-                base = add(base, arm)
-            anchor[character, leg, 0] = base[0]
-            anchor[character, leg, 1] = base[2]
-        x = anchor[character, leg, 0] - point[0]
-        z = anchor[character, leg, 1] - point[2]
-        yaw = wrapped_angle(anchor_yaw[character, leg] - heading)
-        if abs(yaw) > limits.release_yaw:
-            yaw = limits.release_yaw if yaw > 0.0 else -limits.release_yaw
-            anchor_yaw[character, leg] = heading + yaw
-        release = limits.release_distance * leg_scale
-        if x * x + z * z > release * release:
-            is_released[character, leg] = True
-            wanted = SWING
-        else:
-            y, y_rate = ease(before[1], offset_rate[character, leg, 1], -point[1], limits.ground_rate, dt)
-            offset[character, leg, 0] = x
-            offset[character, leg, 1] = y
-            offset[character, leg, 2] = z
-            offset_rate[character, leg, 0] = (x - before[0]) / dt
-            offset_rate[character, leg, 1] = y_rate
-            offset_rate[character, leg, 2] = (z - before[2]) / dt
-            yaw_offset[character, leg] = yaw
-            yaw_offset_rate[character, leg] = (yaw - yaw_before) / dt
-    if wanted == SWING:
-        for axis in range(3):
-            value, rate = ease(before[axis], offset_rate[character, leg, axis], 0.0, limits.swing_rate, dt)
-            offset[character, leg, axis] = value
-            offset_rate[character, leg, axis] = rate
-        value, rate = ease(yaw_before, yaw_offset_rate[character, leg], 0.0, limits.swing_rate, dt)
-        yaw_offset[character, leg] = value
-        yaw_offset_rate[character, leg] = rate
-    lowest = min(min(heel[1], ball[1]), tip[1]) if wanted != HEEL else min(heel[1], ball[1])
-    if lowest + offset[character, leg, 1] < 0.0:
-        offset[character, leg, 1] = -lowest
-        offset_rate[character, leg, 1] = max(offset_rate[character, leg, 1], 0.0)
-    contact[character, leg] = wanted
-
-
-@inlined_kernel
-def needed_drop(hip: Vector, target: Vector, length: float, stretch: float) -> float:
-    """Find how far the hip must come down for a foot: softly more as the leg comes near its largest stretch.
-
-    The nearer a leg is to straight, the faster its knee turns with the way to the foot: at a bare limit a
-    knee that straightens would stop dead.
-
-    Parameters
-    ----------
-    hip, target : tuple of float
-        Hip in the animation and place of the ankle, in one frame, m.
-    length : float
-        Of the straight leg, m.
-    stretch : float
-        Largest share of it that is used.
+    scale : (G,) float32
+        Proportions.
+    place : tuple of float
+        Root on the ground, world, m.
+    yaw, cosine, sine : float
+        Heading of the character, rad, and its cosine and sine.
+    pelvis : tuple of float
+        Root frame, m.
+    pelvis_rotation : tuple of float
+    row : (256,) float32
+        Pose row.
 
     Returns
     -------
-    float
-        m, not negative.
-    """
-    away = (target[0] - hip[0]) ** 2 + (target[2] - hip[2]) ** 2
-    height = hip[1] - target[1]
-    least = max(1.0 - stretch, TINY)
-    # What lacks from straight: all of it where the leg is bent, `least` where it would have to be straight.
-    slack = max(1.0 - math.sqrt(away + height * height) / length, 0.0)
-    used = (1.0 - slack - least * math.exp(-slack / least)) * length
-    return max(height - math.sqrt(max(used * used - away, 0.0)), 0.0)
-
-
-@inlined_kernel
-def followed_rate(need: float, before: float, fastest: float, dt: float) -> float:
-    """Find how fast the pelvis follows a leg's need at once, m/s."""
-    return min(max((need - before) / dt, -fastest), fastest)
-
-
-@inlined_kernel
-def lower_pelvis(
-    character: int,
-    right: float,
-    left: float,
-    leg_scale: float,
-    limits: LockLimits,
-    dt: float,
-    contact: Any,
-    leg_need: Any,
-    deciding: Any,
-    drop_gap: Any,
-    drop: Any,
-) -> None:
-    """Lower the pelvis as far as the planted leg needs that needs most, in place.
-
-    While one leg decides, the pelvis follows its need at once, so that the leg never comes to its limit with
-    speed. Where another one takes over, needs and rates differ: the difference becomes a gap that is eased
-    away, as is what feet need that are dragged off faster than people sink.
-
-    Parameters
-    ----------
-    character : int
-    right, left : float
-        What each leg needs, planted or not, m.
-    leg_scale : float
-        Scale of the character's legs.
-    limits : LockLimits
-    dt : float
-        s.
-    contact : (N, 2) uint8
-        Contact in force.
-    leg_need : (N, 2) float64
-        In and out: what the legs needed in the last step, m.
-    deciding : (N,) uint8
-        In and out: `UNKNOWN`, `NEITHER` or `FIRST_LEG` and on.
-    drop_gap : (N, 2) float64
-        In and out: how far the pelvis is lower than the deciding leg needs, m, and its rate, m/s.
-    drop : (N,) float64
-        Written: how far the pelvis is lowered, m.
+    PlannedLeg
 
     Notes
     -----
-    **Source:** Bollo, "Inertialization: high-performance animation transitions in Gears of War", 2018.
-    **Differs from the source:** the gap fades as a critically damped spring instead of a polynomial.
+    All other arguments are those of `plan_foot` and `lock_feet_crowd`.
     """
-    fastest = limits.pelvis_speed * leg_scale
-    now, need, rate = NEITHER, 0.0, 0.0
-    if contact[character, 0] != SWING and right > need:
-        now, need = FIRST_LEG, right
-    if contact[character, 1] != SWING and left > need:
-        now, need = FIRST_LEG + 1, left
-    before = deciding[character]
-    gap, gap_rate = drop_gap[character, 0], drop_gap[character, 1]
-    if before != UNKNOWN:
-        right_rate = followed_rate(right, leg_need[character, 0], fastest, dt)
-        left_rate = followed_rate(left, leg_need[character, 1], fastest, dt)
-        if before >= FIRST_LEG:
-            gap += leg_need[character, before - FIRST_LEG]
-            gap_rate += right_rate if before == FIRST_LEG else left_rate
-        if now >= FIRST_LEG:
-            rate = right_rate if now == FIRST_LEG else left_rate
-        gap, gap_rate = ease(gap - (need - rate * dt), gap_rate - rate, 0.0, limits.pelvis_rate, dt)
-    lowered = min(max(need + gap, 0.0), LOWEST * leg_scale)
-    if lowered != need + gap:
-        gap, gap_rate = lowered - need, 0.0
-    leg_need[character, 0], leg_need[character, 1] = right, left
-    deciding[character] = now
-    drop_gap[character, 0], drop_gap[character, 1] = gap, gap_rate
-    drop[character] = lowered
+    leg_scale = np.float64(scale[legs.leg_segment])
+    thigh = multiply(pelvis_rotation, unit_rotation(row, legs.joint[leg, 0]))
+    shank = multiply(thigh, unit_rotation(row, legs.joint[leg, 1]))
+    foot = multiply(shank, unit_rotation(row, legs.joint[leg, 2]))
+    toe = multiply(foot, unit_rotation(row, legs.joint[leg, 3]))
+    hip = add(pelvis, rotate(pelvis_rotation, scaled_offset(legs, leg, 0, scale)))
+    thigh_bone = rotate(thigh, scaled_offset(legs, leg, 1, scale))
+    shank_bone = rotate(shank, scaled_offset(legs, leg, 2, scale))
+    ankle = add(hip, add(thigh_bone, shank_bone))
+    heel = rotate(foot, sole_point(legs, leg, 0, scale))
+    ball = rotate(foot, sole_point(legs, leg, 1, scale))
+    tip = add(rotate(foot, scaled_offset(legs, leg, 3, scale)), rotate(toe, sole_point(legs, leg, 2, scale)))
+    ankle_world = add(place, turned_about_y(cosine, sine, ankle))
+    plan_foot(
+        character,
+        leg,
+        wanted,
+        add(ankle_world, turned_about_y(cosine, sine, heel)),
+        add(ankle_world, turned_about_y(cosine, sine, ball)),
+        add(ankle_world, turned_about_y(cosine, sine, tip)),
+        foot,
+        yaw,
+        leg_scale,
+        limits,
+        dt,
+        contact,
+        is_released,
+        anchor,
+        anchor_yaw,
+        offset,
+        offset_rate,
+        yaw_offset,
+        yaw_offset_rate,
+    )
+    moved = turned_about_y(
+        cosine, -sine, (offset[character, leg, 0], offset[character, leg, 1], offset[character, leg, 2])
+    )
+    # The foot turns about its planted point.
+    turn = from_yaw(yaw_offset[character, leg])
+    turned_heel, turned_ball = rotate(turn, heel), rotate(turn, ball)
+    pivot = heel if contact[character, leg] == HEEL else ball
+    turned_pivot = turned_heel if contact[character, leg] == HEEL else turned_ball
+    target = add(add(ankle, moved), subtract(pivot, turned_pivot))
+    length = bone_length(legs, leg, 1, scale) + bone_length(legs, leg, 2, scale)
+    drop = min(needed_drop(hip, target, length, limits.stretch), LOWEST * leg_scale)
+    return PlannedLeg(
+        hip,
+        thigh_bone,
+        shank_bone,
+        turned_heel,
+        turned_ball,
+        thigh,
+        shank,
+        multiply(turn, foot),
+        target,
+        drop,
+    )
+
+
+@inlined_kernel
+def bend_leg(
+    character: int,
+    leg: int,
+    plan: PlannedLeg,
+    legs: LegArrays,
+    stretch: float,
+    place: Vector,
+    cosine: float,
+    sine: float,
+    drop: float,
+    pelvis_rotation: Quaternion,
+    row: Any,
+    out_foot_point_world: Any,
+) -> None:
+    """Bend a leg until its foot is where it is planned, from a hip that has come down.
+
+    Parameters
+    ----------
+    plan : PlannedLeg
+    stretch : float
+        See `LockLimits`.
+    drop : float
+        How far the pelvis has come down, m.
+    row : (256,) float32
+        In and out: pose row.
+
+    Notes
+    -----
+    All other arguments are those of `plan_leg` and `lock_feet_crowd`.
+    """
+    hip = (plan.hip[0], plan.hip[1] - drop, plan.hip[2])
+    knee = add(hip, plan.thigh_bone)
+    hinge = rotate(plan.thigh, (1.0, 0.0, 0.0))
+    first, second, _ = bend_rotations(hip, knee, add(knee, plan.shank_bone), plan.ankle, hinge, stretch)
+    thigh = multiply(first, plan.thigh)
+    shank = multiply(first, multiply(second, plan.shank))
+    set_joint_rotation(row, legs.joint[leg, 0], multiply(conjugate(pelvis_rotation), thigh))
+    set_joint_rotation(row, legs.joint[leg, 1], multiply(conjugate(thigh), shank))
+    set_joint_rotation(row, legs.joint[leg, 2], multiply(conjugate(shank), plan.foot))
+    leg_bone = rotate(first, add(plan.thigh_bone, rotate(second, plan.shank_bone)))
+    ankle = add(place, turned_about_y(cosine, sine, add(hip, leg_bone)))
+    heel = add(ankle, turned_about_y(cosine, sine, plan.heel))
+    ball = add(ankle, turned_about_y(cosine, sine, plan.ball))
+    for axis in range(3):
+        out_foot_point_world[character, leg, 0, axis] = heel[axis]
+        out_foot_point_world[character, leg, 1, axis] = ball[axis]
 
 
 @inlined_kernel
@@ -320,72 +284,74 @@ def lock_character(
     out_foot_point_world: Any,
     out_foot_contact: Any,
 ) -> None:
-    """Plan and solve both legs of one character; arguments as in `lock_feet_crowd`."""
+    """Plan and bend both legs of one character; arguments as in `lock_feet_crowd`."""
     row = pose_rotation[character]
     scale = segment_scale[character]
-    leg_scale = float(scale[legs.leg_segment])
+    leg_scale = np.float64(scale[legs.leg_segment])
     pelvis = (
-        float(pose_pelvis[character, 0]) * leg_scale,
-        float(pose_pelvis[character, 1]) * leg_scale,
-        float(pose_pelvis[character, 2]) * leg_scale,
+        np.float64(pose_pelvis[character, 0]) * leg_scale,
+        np.float64(pose_pelvis[character, 1]) * leg_scale,
+        np.float64(pose_pelvis[character, 2]) * leg_scale,
     )
-    pelvis_rotation = joint_rotation(row, 0)
-    facing = from_yaw(yaw[character])
-    unfacing = conjugate(facing)
+    pelvis_rotation = unit_rotation(row, 0)
+    cosine, sine = math.cos(yaw[character]), math.sin(yaw[character])
     place = (position_world[character, 0], 0.0, position_world[character, 2])
-    needs = (0.0, 0.0)
-    # The two feet are planned first, because both decide how far the pelvis must come down.
-    for leg in range(2):
-        thigh = normalized(multiply(pelvis_rotation, joint_rotation(row, legs.joint[leg, 0])))
-        shank = normalized(multiply(thigh, joint_rotation(row, legs.joint[leg, 1])))
-        foot = normalized(multiply(shank, joint_rotation(row, legs.joint[leg, 2])))
-        toe = normalized(multiply(foot, joint_rotation(row, legs.joint[leg, 3])))
-        hip = add(pelvis, rotate(pelvis_rotation, scaled_offset(legs, leg, 0, scale)))
-        upper = scaled_offset(legs, leg, 1, scale)
-        lower = scaled_offset(legs, leg, 2, scale)
-        ankle = add(add(hip, rotate(thigh, upper)), rotate(shank, lower))
-        heel = add(ankle, rotate(foot, sole_point(legs, leg, 0, scale)))
-        ball = add(ankle, rotate(foot, sole_point(legs, leg, 1, scale)))
-        toe_joint = add(ankle, rotate(foot, scaled_offset(legs, leg, 3, scale)))
-        tip = add(toe_joint, rotate(toe, sole_point(legs, leg, 2, scale)))
-        heading = heading_of(foot) + yaw[character]
-        plan_foot(
-            character,
-            leg,
-            contact_wanted[character, leg],
-            add(place, rotate(facing, heel)),
-            add(place, rotate(facing, ball)),
-            add(place, rotate(facing, tip)),
-            heading,
-            leg_scale,
-            limits,
-            dt,
-            contact,
-            is_released,
-            anchor,
-            anchor_yaw,
-            offset,
-            offset_rate,
-            yaw_offset,
-            yaw_offset_rate,
-        )
-        # The foot turns about its planted point.
-        pivot = heel if contact[character, leg] == HEEL else ball
-        turn = from_yaw(yaw_offset[character, leg])
-        moved = (offset[character, leg, 0], offset[character, leg, 1], offset[character, leg, 2])
-        target = add(add(pivot, rotate(unfacing, moved)), rotate(turn, subtract(ankle, pivot)))
-        out_foot_point_world[character, leg, 0, 0] = target[0]
-        out_foot_point_world[character, leg, 0, 1] = target[1]
-        out_foot_point_world[character, leg, 0, 2] = target[2]
-        length = norm(upper) + norm(lower)
-        need = min(needed_drop(hip, target, length, limits.stretch), LOWEST * leg_scale)
-        needs = (need, needs[1]) if leg == 0 else (needs[0], need)
+    # Both feet are planned first, because both decide how far the pelvis must come down.
+    right = plan_leg(
+        character,
+        0,
+        legs,
+        limits,
+        scale,
+        place,
+        yaw[character],
+        cosine,
+        sine,
+        pelvis,
+        pelvis_rotation,
+        contact_wanted[character, 0],
+        dt,
+        row,
+        contact,
+        is_released,
+        anchor,
+        anchor_yaw,
+        offset,
+        offset_rate,
+        yaw_offset,
+        yaw_offset_rate,
+    )
+    left = plan_leg(
+        character,
+        1,
+        legs,
+        limits,
+        scale,
+        place,
+        yaw[character],
+        cosine,
+        sine,
+        pelvis,
+        pelvis_rotation,
+        contact_wanted[character, 1],
+        dt,
+        row,
+        contact,
+        is_released,
+        anchor,
+        anchor_yaw,
+        offset,
+        offset_rate,
+        yaw_offset,
+        yaw_offset_rate,
+    )
     lower_pelvis(
         character,
-        needs[0],
-        needs[1],
-        leg_scale,
-        limits,
+        right.drop,
+        left.drop,
+        limits.pelvis_speed * leg_scale,
+        limits.pelvis_rate,
+        LOWEST * leg_scale,
         dt,
         contact,
         leg_need,
@@ -393,38 +359,22 @@ def lock_character(
         drop_gap,
         drop,
     )
-    pelvis = (pelvis[0], pelvis[1] - drop[character], pelvis[2])
-    pose_pelvis[character, 1] = pelvis[1] / leg_scale
+    pose_pelvis[character, 1] = (pelvis[1] - drop[character]) / leg_scale
     for leg in range(2):
-        thigh = normalized(multiply(pelvis_rotation, joint_rotation(row, legs.joint[leg, 0])))
-        shank = normalized(multiply(thigh, joint_rotation(row, legs.joint[leg, 1])))
-        foot = normalized(multiply(shank, joint_rotation(row, legs.joint[leg, 2])))
-        hip = add(pelvis, rotate(pelvis_rotation, scaled_offset(legs, leg, 0, scale)))
-        knee = add(hip, rotate(thigh, scaled_offset(legs, leg, 1, scale)))
-        ankle = add(knee, rotate(shank, scaled_offset(legs, leg, 2, scale)))
-        target = (
-            out_foot_point_world[character, leg, 0, 0],
-            out_foot_point_world[character, leg, 0, 1],
-            out_foot_point_world[character, leg, 0, 2],
+        bend_leg(
+            character,
+            leg,
+            right if leg == 0 else left,
+            legs,
+            limits.stretch,
+            place,
+            cosine,
+            sine,
+            drop[character],
+            pelvis_rotation,
+            row,
+            out_foot_point_world,
         )
-        hinge = rotate(thigh, (1.0, 0.0, 0.0))
-        first, second, _ = bend_rotations(hip, knee, ankle, target, hinge, limits.stretch)
-        new_thigh = normalized(multiply(first, thigh))
-        new_shank = turned(first, second, shank)
-        new_foot = normalized(multiply(from_yaw(yaw_offset[character, leg]), foot))
-        set_joint_rotation(row, legs.joint[leg, 0], multiply(conjugate(pelvis_rotation), new_thigh))
-        set_joint_rotation(row, legs.joint[leg, 1], multiply(conjugate(new_thigh), new_shank))
-        set_joint_rotation(row, legs.joint[leg, 2], multiply(conjugate(new_shank), new_foot))
-        ankle = add(
-            add(hip, rotate(new_thigh, scaled_offset(legs, leg, 1, scale))),
-            rotate(new_shank, scaled_offset(legs, leg, 2, scale)),
-        )
-        for point in range(2):
-            final = add(ankle, rotate(new_foot, sole_point(legs, leg, point, scale)))
-            final = add(place, rotate(facing, final))
-            out_foot_point_world[character, leg, point, 0] = final[0]
-            out_foot_point_world[character, leg, point, 1] = final[1]
-            out_foot_point_world[character, leg, point, 2] = final[2]
         out_foot_contact[character, leg] = contact[character, leg]
 
 

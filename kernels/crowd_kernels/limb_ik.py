@@ -70,18 +70,36 @@ def bend_rotations(
         status = TOO_CLOSE
     axis = cross(upper, lower)
     sine = norm(axis)
-    now = math.atan2(sine, dot(upper, lower))
-    if not sine > 1e-6 * upper_length * lower_length:
+    product = upper_length * lower_length
+    now_cosine, now_sine = half_angle(dot(upper, lower) / product, sine / product)
+    if not sine > 1e-6 * product:
         axis = _across(upper, hinge)
         sine = norm(axis)
     cosine = (distance * distance - upper_length * upper_length - lower_length * lower_length) / (
-        2.0 * upper_length * lower_length
+        2.0 * product
     )
-    half_turn = 0.5 * (math.acos(min(max(cosine, -1.0), 1.0)) - now)
-    share = math.sin(half_turn) / sine
-    second = (math.cos(half_turn), axis[0] * share, axis[1] * share, axis[2] * share)
+    cosine = min(max(cosine, -1.0), 1.0)
+    then_cosine, then_sine = math.sqrt(0.5 * (1.0 + cosine)), math.sqrt(0.5 * (1.0 - cosine))
+    # The bone turns by the difference of the two angles, of which a rotation takes one half.
+    share = (then_sine * now_cosine - then_cosine * now_sine) / sine
+    second = (
+        then_cosine * now_cosine + then_sine * now_sine,
+        axis[0] * share,
+        axis[1] * share,
+        axis[2] * share,
+    )
     first = between(add(upper, rotate(second, lower)), way)
     return first, second, status
+
+
+@kernel
+def half_angle(cosine: float, sine: float) -> tuple[float, float]:
+    """Find cosine and sine of half an angle from 0 to pi, exact at both ends."""
+    if cosine >= 0.0:
+        half = math.sqrt(0.5 * (1.0 + cosine))
+        return half, 0.5 * sine / half
+    half = math.sqrt(0.5 * (1.0 - cosine))
+    return 0.5 * sine / half, half
 
 
 @kernel

@@ -1,13 +1,11 @@
 """Foot locking as its slow twin does it, on people who sway, turn, slip, step and are dragged."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from crowd.controllers.foot_lock import FootLock
 from crowd.motion.body import build_skeleton
-from crowd_kernels.foot_lock import needed_drop
 from tests.oracles import foot_lock as oracle
 from tests.oracles import pose
 
@@ -88,26 +86,26 @@ class Walk:
             )
             written = pose.row_to_quaternions(rows[k])
             matrices = [[pose.matrix(written[joint]) for joint in leg[:3]] for leg in lock.legs.joint]
-            yield "rotations", np.array(matrices), local, 2e-6
-            yield "pelvis", pelvis[k], lowered, 1e-6
-            yield "points", point[k], points, 1e-6
+            yield "rotations", np.array(matrices), local, 2e-7
+            yield "pelvis", pelvis[k], lowered, 1.2e-7
+            yield "points", point[k], points, 1e-11
             yield "contact", contact[k], contacts, 0
-            yield "drop", lock.drop[k], person.drop, 1e-6
+            yield "drop", lock.drop[k], person.drop, 1e-10
             for leg, foot in enumerate(person.feet):
-                yield "offset", lock.offset[k, leg], foot.offset, 1e-6
-                yield "offset rate", lock.offset_rate[k, leg], foot.offset_rate, 1e-4
-                yield "yaw", lock.yaw_offset[k, leg], foot.yaw, 1e-6
+                yield "offset", lock.offset[k, leg], foot.offset, 1e-12
+                yield "offset rate", lock.offset_rate[k, leg], foot.offset_rate, 1e-9
+                yield "yaw", lock.yaw_offset[k, leg], foot.yaw, 1e-12
                 yield "released", lock.is_released[k, leg], foot.is_released, 0
             untouched = np.ones(len(written), bool)
             untouched[lock.legs.joint[:, :3]] = False
             yield "other joints", written[untouched], pose.row_to_quaternions(before[k])[untouched], 0
 
 
-@settings(max_examples=8)
+@settings(max_examples=6)
 @given(seed=st.integers(0, 2**32 - 1), sway=st.floats(0, 0.3), drift=st.floats(0, 1.2))
 def test_every_step_is_that_of_the_slow_twin(seed, sway, drift):
     walk = Walk(seed, sway, drift)
-    for step in range(30):
+    for step in range(25):
         for name, found, expected, tolerance in walk.step():
             np.testing.assert_allclose(
                 found, expected, rtol=0, atol=tolerance, err_msg=f"{name}, step {step}"
@@ -115,34 +113,18 @@ def test_every_step_is_that_of_the_slow_twin(seed, sway, drift):
 
 
 def test_these_people_show_all_that_there_is():
-    """Landings, hand-overs, feet let go, pelvises lowered by either leg and legs at their limit all occur."""
+    """Landings, hand-overs, feet let go, pelvises lowered by either leg and legs at their limit all occur.
+
+    The first comparison of a step is enough to take it.
+    """
     seen = dict.fromkeys(("heel", "ball", "released", "right decides", "left decides", "neither"), 0)
     for seed in range(4):
         walk = Walk(seed, 0.2, 1.0)
         for _ in range(40):
-            for _ in walk.step():
-                pass
+            next(walk.step())
             seen["heel"] += int((walk.lock.contact == 1).sum())
             seen["ball"] += int((walk.lock.contact == 2).sum())
             seen["released"] += int(walk.lock.is_released.sum())
             for number, name in enumerate(("neither", "right decides", "left decides"), 1):
                 seen[name] += int((walk.lock.deciding == number).sum())
     assert min(seen.values()) > 10, seen
-
-
-@pytest.mark.parametrize("stretch", [0.9, 0.99, 0.999])
-@pytest.mark.parametrize("away", [0.0, 0.2])
-def test_legs_grow_softly_to_their_limit_and_bent_ones_are_left_alone(stretch, away):
-    height = np.linspace(0.3, 1.2, 4000)
-    ankle = (0.1 + away, 0.05, 0.3)
-    hip = [(0.1, 0.05 + high, 0.3) for high in height]
-    drop = np.array([needed_drop(place, ankle, 1.0, stretch) for place in hip])
-    slow = [oracle.needed_drop(np.array(place), np.array(ankle), 1.0, stretch) for place in hip]
-    np.testing.assert_allclose(drop, slow, atol=1e-12)
-    way, used = np.hypot(away, height), np.hypot(away, height - drop)
-    assert used.max() <= stretch + 1e-12
-    assert drop[way < 1 - 20 * (1 - stretch)].max(initial=0) < 1e-8
-    slope = np.diff(used) / np.diff(way)
-    assert slope.min() > -1e-9
-    assert slope.max() < 1 + 1e-9
-    assert np.abs(np.diff(slope)).max() < 1.1 * np.diff(way).max() / (1 - stretch)
