@@ -15,6 +15,8 @@ FloatArray = npt.NDArray[np.float64]
 DISTANCES = (0.46, 0.54, 0.38, 0.62, 0.70, 0.30, 0.78)
 """Ground distances from the target in the order of preference, at a stature of `STATURE`, m."""
 DIRECTIONS = 24
+FINE_DIRECTIONS = 72
+"""Directions from the target that are tried when none of the few will do, as beside somebody at a table."""
 BOTH = 2
 STATURE = 1.75
 ASIDE = 0.30
@@ -72,7 +74,31 @@ def find_standing_place(
     **Differs from the source:** the place is chosen among obstacles and people instead of on the straight
     line to the target.
     """
-    points, yaw, rank = _places_around(target_world, stature, hand)
+    for directions in (DIRECTIONS, FINE_DIRECTIONS):
+        points, yaw, rank = _places_around(target_world, stature, hand, directions)
+        candidates = _where_one_can_stand(
+            world, points, yaw, target_world, start_world, stature, radius, hand, taken
+        )
+        if candidates.size:
+            way = np.linalg.norm(points[candidates] - start_world, axis=1)
+            order = np.argsort(way + NEARNESS_WEIGHT * rank[candidates], kind="stable")
+            chosen = candidates[order[min(attempt * 5, candidates.size - 1)]]
+            return StandingPlace(points[chosen], float(yaw[chosen]))
+    return None
+
+
+def _where_one_can_stand(
+    world: World,
+    points: FloatArray,
+    yaw: FloatArray,
+    target_world: FloatArray,
+    start_world: FloatArray,
+    stature: float,
+    radius: float,
+    hand: int,
+    taken: Sequence[tuple[FloatArray, float]],
+) -> npt.NDArray[np.intp]:
+    """Rows of the places that are free, from which the arms can reach, and to which there is a way."""
     fits = world.is_walkable(points, radius)
     for place, other in taken:
         away = points - place
@@ -82,12 +108,7 @@ def find_standing_place(
     if candidates.size:
         starts = np.repeat(start_world[None], candidates.size, axis=0)
         candidates = candidates[world.is_reachable(starts, points[candidates], radius)]
-    if candidates.size == 0:
-        return None
-    way = np.linalg.norm(points[candidates] - start_world, axis=1)
-    order = np.argsort(way + NEARNESS_WEIGHT * rank[candidates], kind="stable")
-    chosen = candidates[order[min(attempt * 5, candidates.size - 1)]]
-    return StandingPlace(points[chosen], float(yaw[chosen]))
+    return candidates
 
 
 def is_behind_walls(
@@ -98,15 +119,15 @@ def is_behind_walls(
 
 
 def _places_around(
-    target_world: FloatArray, stature: float, hand: int
+    target_world: FloatArray, stature: float, hand: int, directions: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Places (P, 3) around a target, headings there (P,), and how far each is from the best distance (P,)."""
-    angle = 2.0 * math.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    angle = 2.0 * math.pi * np.arange(directions) / directions
     length = np.array(DISTANCES) * stature / STATURE
-    steps = np.stack([np.sin(angle), np.zeros(DIRECTIONS), np.cos(angle)], axis=1)
+    steps = np.stack([np.sin(angle), np.zeros(directions), np.cos(angle)], axis=1)
     points = (target_world * [1.0, 0.0, 1.0] + length[:, None, None] * steps).reshape(-1, 3)
     yaw = np.tile(angle - math.pi + (ASIDE, -ASIDE, 0.0)[hand], len(length))
-    return points, yaw, np.repeat(np.abs(length - length[0]), DIRECTIONS)
+    return points, yaw, np.repeat(np.abs(length - length[0]), directions)
 
 
 def _is_free_for_arms(

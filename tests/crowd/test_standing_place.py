@@ -52,6 +52,17 @@ def test_places_of_others_are_left_to_them():
     assert np.linalg.norm(first.position_world - second.position_world) > 0.5
 
 
+@pytest.mark.parametrize("stature", [1.55, 1.6, 1.65, 1.75])
+@pytest.mark.parametrize("depth", [0.05, 0.1, 0.17])
+def test_there_is_a_place_beside_somebody_who_stands_at_a_table(stature, depth):
+    world = World(BOUNDS, [Box(-2.0, 2.0, 0.0, 0.7, 0.75)])
+    other, target = np.array([0.0, 0.0, -0.31]), np.array([0.0, 0.81, depth])
+    place = find_standing_place(world, target, START, stature, 0.25, 0, [(other, 0.25)])
+    assert np.linalg.norm(place.position_world - other) > 0.5
+    assert np.linalg.norm(place.position_world - target * [1.0, 0.0, 1.0]) < 0.8
+    assert world.is_walkable(place.position_world[None], 0.25)[0]
+
+
 def test_another_try_finds_another_place():
     first, second = find(World(BOUNDS)), find(World(BOUNDS), attempt=1)
     assert np.linalg.norm(first.position_world - second.position_world) > 0.1
