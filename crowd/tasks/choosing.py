@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from crowd.state import FloatArray
+from crowd.state import BoolArray, FloatArray
 from crowd.tasks.partners import missing_half
 from crowd.tasks.present_task import (
     are_empty,
@@ -51,6 +51,8 @@ LOOKS_FOR_SOMEBODY = 5
 """Times that a person looks for the other one of two who hand something over before the task fails."""
 MOST_CONSIDERED = 10
 """Objects or places on boards that are tried, the nearest first."""
+TOUCHING = 1e-3
+"""Overlap of two things that stand side by side, m."""
 
 
 def choose_walk(tasks: Tasks, row: int, time: float) -> Outcome:
@@ -164,8 +166,18 @@ def choose_spot(tasks: Tasks, row: int, time: float) -> Outcome:
     kind, group, point = task_of(tasks, row)
     rotation = simulation.model.objects.start_rotation_world[item]
     lift = np.array([0.0, -simulation.model.objects.lowest_point(item, rotation), 0.0])
-    places = point[None] if kind is Target.POINT else _free_spots(tasks, row, group)
-    return _take_first_place(tasks, row, places + lift)
+    places = (point[None] if kind is Target.POINT else _free_spots(tasks, row, group)) + lift
+    return _take_first_place(tasks, row, places[~_are_in_others(tasks, item, places)])
+
+
+def _are_in_others(tasks: Tasks, item: int, places_world: FloatArray) -> BoolArray:
+    """At which places (P, 3) an object would certainly be inside another one: balls within both overlap."""
+    objects = tasks.simulation.objects
+    inner = tasks.simulation.model.objects.half_size.min(axis=1)
+    others = np.flatnonzero((objects.holder < 0) & np.isfinite(objects.position_world).all(axis=1))
+    others = others[others != item]
+    away = np.linalg.norm(places_world[:, None] - objects.position_world[others], axis=2)
+    return np.asarray((away < inner[item] + inner[others] - TOUCHING).any(axis=1))
 
 
 def _nearest_furniture(tasks: Tasks, row: int, group: int) -> Furniture:

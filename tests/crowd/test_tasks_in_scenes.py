@@ -91,6 +91,24 @@ def test_its_own_name_means_a_thing_that_was_put_down_too(tmp_path):
     assert simulation.objects.holder.tolist() == [0, -1]
 
 
+def test_nothing_is_put_into_what_stands_there_until_it_is_taken_away(tmp_path):
+    place = "put_down = [0.0, 0.75, 2.3]"
+    people = person("ann", 0.0, 0.0, f'{{ pick_up = "can_1" }}, {{ {place} }}, {{ walk_to = [-3.0, 0.0] }}')
+    people += person("ben", 1.0, 0.0, f'{{ wait = 15.0 }}, {{ pick_up = "can_2" }}, {{ {place} }}')
+    people += person("cid", 3.0, -2.0, '{ wait = 35.0 }, { pick_up = "can_1" }, { walk_to = [3.0, 3.0] }')
+    simulation = scene(tmp_path, people)
+    nearest = np.inf
+    for _ in simulation.run(seconds=90.0):
+        if (simulation.objects.holder < 0).all():
+            nearest = min(nearest, np.linalg.norm(np.subtract(*simulation.objects.position_world)))
+        if simulation.is_finished:
+            break
+    assert simulation.metrics.as_dict()["tasks.failed"] == 0
+    assert nearest > 0.07
+    assert simulation.objects.holder.tolist() == [2, -1]
+    assert np.allclose(simulation.objects.position_world[1], (0.0, 0.825, 2.3), atol=0.002)
+
+
 def test_nobody_waits_for_a_kind_of_which_all_are_put_down(tmp_path):
     fetch = '{ pick_up = "can" }, { put_down = "table" }, '
     simulation = scene(tmp_path, person("ann", 0.0, 0.0, fetch * 2 + '{ pick_up = "can" }'))
