@@ -59,6 +59,18 @@ def test_a_run_leaves_a_picture_a_video_and_a_recording_to_view(drawing, tmp_pat
     assert capsys.readouterr().err.startswith(expected)
 
 
+@pytest.mark.parametrize("ending", ["mp4", "webm", "mkv", "mov"])
+def test_a_video_of_one_frame_can_be_played(drawing, tmp_path, ending):
+    pytest.importorskip("imageio_ffmpeg")
+    imageio = pytest.importorskip("imageio.v3")
+    video = tmp_path / f"a.{ending}"
+    arguments = ["run", "plaza", "--characters", "5", "--seconds", "0.01", "--video", str(video)]
+    assert exit_code([*arguments, "--threads", "1"]) == 0
+    frames = imageio.imread(video)
+    assert frames.shape == (1, 720, 1280, 3)
+    assert frames.std() > 15
+
+
 def test_the_viewer_is_loaded_only_when_something_is_shown():
     loaded = "[name for name in sys.modules if name.partition('.')[0] in ('crowd_viewer', 'moderngl')]"
     code = f"import crowd.cli, sys; print({loaded})"

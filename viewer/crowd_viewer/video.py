@@ -138,12 +138,14 @@ class Film:
         self._renderer = Renderer(headless_context(), self._source.scene, size, quality)
         self._writer = VideoWriter(path, size, frames_per_second)
         self._interval = 1.0 / frames_per_second
-        self._begin = simulation.time
+        self._begin: float | None = None
         self._written = 0
 
     def record(self, frame: Frame) -> None:
-        """Draw a frame as often as its time asks for."""
-        due = int((frame.time - self._begin) / self._interval + 1e-6)
+        """Draw a frame as often as its time asks for, the first always: no player opens an empty video."""
+        if self._begin is None:
+            self._begin = frame.time
+        due = 1 + int((frame.time - self._begin) / self._interval + 1e-6)
         if due > self._written:
             self._renderer.draw(self._source.frame(), self._camera)
             picture = self._renderer.picture()
