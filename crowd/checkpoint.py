@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
 FORMAT = 1
+BEGIN = b"PK\x03\x04"
+"""How a file begins that `save` has written: it is an archive of arrays."""
+SHOWN_BYTES = 8
+ALLOWED = "a file written by Simulation.save"
 
 
 class Stateful(Protocol):
@@ -79,16 +84,9 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     RecordingError
-        The file is no checkpoint, or belongs to another run.
+        The file is no checkpoint, or belongs to another run; the simulation is as it was.
     """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            facts = json.loads(str(stored["facts"]))
-            contents = {name: stored[name] for name in stored.files if name != "facts"}
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise RecordingError(
-            describe(str(path), "is not a checkpoint", str(error).splitlines()[0])
-        ) from error
+    facts, contents = _read(Path(path))
     expected = {
         "format": FORMAT,
         "scenario": simulation.scenario.name,
@@ -103,10 +101,48 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> None:
             )
     for name, array in state_arrays(simulation):
         stored_array = contents.get(name)
-        if stored_array is None or stored_array.shape != array.shape:
+        if stored_array is None or (stored_array.shape, stored_array.dtype) != (array.shape, array.dtype):
+            got = None if stored_array is None else f"{stored_array.dtype} {stored_array.shape}"
             raise RecordingError(
-                describe(str(path), f"checkpoint lacks {name}", allowed=f"shape {array.shape}")
+                describe(str(path), f"checkpoint lacks {name}", got, f"{array.dtype} {array.shape}")
             )
-        array[...] = stored_array
+    for name, array in state_arrays(simulation):
+        array[...] = contents[name]
     simulation.step_index = int(facts["step_index"])
     simulation.model.timetable.update(simulation.model.world, simulation.time)
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Facts and arrays of a checkpoint.
+
+    Raises
+    ------
+    RecordingError
+        The file is missing, cut off, damaged, or something else.
+    """
+    try:
+        with path.open("rb") as file:
+            begin = file.read(SHOWN_BYTES)
+            # NumPy would take anything else for a pickle.
+            if not begin.startswith(BEGIN):
+                got = begin or "an empty file"
+                raise RecordingError(describe(str(path), "is not a checkpoint", got, ALLOWED))
+            if not zipfile.is_zipfile(file):
+                got = f"{path.stat().st_size} bytes"
+                raise RecordingError(describe(str(path), "is cut off", got, "the whole file"))
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as stored:
+                contents = {name: stored[name] for name in stored.files}
+    except OSError as error:
+        got = error.strerror or str(error)
+        raise RecordingError(describe(str(path), "cannot be read", got, ALLOWED)) from error
+    except (ValueError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        got = str(error).partition("\n")[0]
+        raise RecordingError(describe(str(path), "is damaged", got, ALLOWED)) from error
+    try:
+        facts = json.loads(str(contents.pop("facts")))
+        int(facts["step_index"])
+    except (KeyError, ValueError, TypeError) as error:
+        got = ", ".join(list(contents)[:4])
+        raise RecordingError(describe(str(path), "is not a checkpoint", f"arrays {got}", ALLOWED)) from error
+    return facts, contents

@@ -1,5 +1,7 @@
 """Whole runs: repeatable bits, stop and go on, people who get where they should, obstacles that go."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -88,12 +90,82 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path):
     simulation.save(tmp_path / "stop.npz")
     with pytest.raises(RecordingError, match="seed"):
         crowd.Simulation(busy(), seed=6).restore(tmp_path / "stop.npz")
-    (tmp_path / "broken.npz").write_bytes(b"nothing")
-    with pytest.raises(RecordingError, match="not a checkpoint"):
-        simulation.restore(tmp_path / "broken.npz")
     with pytest.raises(RecordingError, match="cannot write"):
         simulation.save(tmp_path / "nowhere" / "stop.npz")
     assert not list(tmp_path.glob("*.partial"))
+
+
+def changed_checkpoint(path, **changes):
+    """Write the checkpoint beside `path` with other arrays; None leaves one out."""
+    with np.load(path.with_name("stop.npz")) as stored:
+        contents = {**stored, **changes}
+    np.savez(path, **{name: array for name, array in contents.items() if array is not None})
+
+
+def single_array(path):
+    """Write one array, as NumPy does outside archives."""
+    with path.open("wb") as file:
+        np.save(file, np.zeros(3))
+
+
+def flipped_byte(path):
+    """Write the checkpoint beside `path` with one wrong byte in the middle."""
+    content = bytearray(path.with_name("stop.npz").read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("write", "message"),
+    [
+        (
+            lambda path: path.write_text("t,id,x,y\n0,1,2,3\n"),
+            r"is not a checkpoint; got b't,id,x,y'; ",
+        ),
+        (lambda path: path.write_bytes(b""), "is not a checkpoint; got 'an empty file'; "),
+        (single_array, r"is not a checkpoint; got b'\x93NUMPY"),
+        (lambda path: path.write_bytes(pickle.dumps({"seed": 5})), "is not a checkpoint; got b'"),
+        (lambda path: np.savez(path, a=np.zeros(3), b=1), "is not a checkpoint; got 'arrays a, b'; "),
+        (lambda path: changed_checkpoint(path, facts=None), "is not a checkpoint; got 'arrays state."),
+        (lambda path: changed_checkpoint(path, facts=np.array("3")), "is not a checkpoint; got 'arrays "),
+        (lambda path: path.mkdir(), "cannot be read; got 'Is a directory'; "),
+        (lambda path: None, "cannot be read; got 'No such file or directory'; "),
+        (flipped_byte, "is damaged; got "),
+    ],
+)
+def test_what_is_no_checkpoint_is_one_line(tmp_path, write, message):
+    simulation = crowd.Simulation(busy(), seed=5)
+    simulation.save(tmp_path / "stop.npz")
+    path = tmp_path / "other.npz"
+    write(path)
+    with pytest.raises(RecordingError) as caught:
+        simulation.restore(path)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(f"{path}: {message}")
+    assert line.endswith("; allowed a file written by Simulation.save")
+    assert "pickle" not in line
+
+
+def test_a_checkpoint_that_does_not_fit_changes_nothing(tmp_path):
+    simulation = crowd.Simulation(busy(), seed=5)
+    simulation.save(tmp_path / "stop.npz")
+    for _ in simulation.run(seconds=0.1):
+        pass
+    whole = (tmp_path / "stop.npz").read_bytes()
+    (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
+    changed_checkpoint(tmp_path / "lacks.npz", **{"state.yaw": None})
+    changed_checkpoint(tmp_path / "text.npz", **{"state.yaw": np.full(simulation.state.yaw.shape, "left")})
+    before = arrays_of(simulation)
+    for name, message in (
+        ("cut", f"is cut off; got '{len(whole) // 2} bytes'; allowed the whole file"),
+        ("lacks", "checkpoint lacks state.yaw; allowed float64 "),
+        ("text", "checkpoint lacks state.yaw; got '<U4 "),
+    ):
+        with pytest.raises(RecordingError) as caught:
+            simulation.restore(tmp_path / f"{name}.npz")
+        assert str(caught.value).startswith(f"{tmp_path / name}.npz: {message}")
+    after = arrays_of(simulation)
+    assert_equal_bits(before, after)
 
 
 def walker(**changes):
