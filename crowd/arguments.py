@@ -1,13 +1,38 @@
-"""Vectors, rotations, times and seeds that programs give, checked."""
+"""Numbers, vectors, rotations, times and seeds that programs give, checked."""
 
 import math
 import operator
-from typing import SupportsIndex
+from typing import SupportsFloat, SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import SettingsError, describe
+
+
+def number(what: str, name: str, value: SupportsFloat, allowed: str) -> float:
+    """Read one number; that it is in its range remains to be checked.
+
+    Parameters
+    ----------
+    what, name : str
+        Command and argument, for messages.
+    value : number
+        Text is refused, also such as looks like a number.
+    allowed : str
+        The range, for messages.
+
+    Raises
+    ------
+    SettingsError
+        It is no number.
+    """
+    try:
+        if isinstance(value, str | bytes):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise SettingsError(describe(what, f"{name} is not a number", str(value), allowed)) from None
 
 
 def vectors(

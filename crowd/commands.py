@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from crowd.arguments import rotations_of, vectors
+from crowd.arguments import number, rotations_of, vectors
 from crowd.controllers.carrying import FREE
 from crowd.controllers.grab import CLOSING, HOLDING, GrabStatus
 from crowd.errors import SettingsError, describe
@@ -55,6 +55,7 @@ class Commands:
         goals = vectors("set_goal", "goal", goal_world, rows.size, (2, 3))
         if goals.shape[1] == 2:
             goals = np.insert(goals, 1, 0.0, axis=1)
+        radius = number("set_goal", "radius", radius, "> 0 m")
         if not radius > 0:
             raise SettingsError(describe("set_goal", "radius must be positive", radius, "> 0 m"))
         simulation = self._simulation
@@ -126,7 +127,10 @@ class Commands:
             )
         if clip.frame_count < 2:
             raise SettingsError(describe("play", "is a single pose", clip_name, "a gesture or idle clip"))
-        length = clip.duration * repetitions if seconds is None else seconds
+        if seconds is None:
+            length = clip.duration * number("play", "repetitions", repetitions, "> 0")
+        else:
+            length = number("play", "seconds", seconds, "> 0 s")
         if not length > 0 or math.isnan(length):
             raise SettingsError(describe("play", "length must be positive", length, "> 0 s"))
         index = model.clip_table.names.index(clip_name)
@@ -177,6 +181,7 @@ class Commands:
             raise SettingsError(
                 describe("look_at", "needs exactly one target", found, "one of point, character, object")
             )
+        trunk = number("look_at", "trunk", trunk, "0 to 1")
         if not 0.0 <= trunk <= 1.0:
             raise SettingsError(describe("look_at", "trunk is out of range", trunk, "0 to 1"))
         if point_world is not None:
@@ -243,9 +248,9 @@ class Commands:
         """
         rows, simulation = self._rows(characters), self._simulation
         targets = vectors("reach", "target", target_world, rows.size, must_be_finite=False)
-        if seconds is not None and not 0.0 < seconds < math.inf:
+        if seconds is not None and not 0.0 < number("reach", "seconds", seconds, "> 0 s") < math.inf:
             raise SettingsError(describe("reach", "seconds are out of range", seconds, "> 0 s"))
-        if hold is not None and not hold >= 0.0:
+        if hold is not None and not number("reach", "hold", hold, ">= 0 s") >= 0.0:
             raise SettingsError(describe("reach", "hold is out of range", hold, ">= 0 s"))
         rotations = None
         if rotation_world is not None:

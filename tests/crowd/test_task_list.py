@@ -220,6 +220,24 @@ def test_whoever_waits_is_told_when_the_other_gives_up(tmp_path):
         (lambda do: do.hand_over(0, 0), "hand_over: the giver holds nothing"),
         (lambda do: do.set_attention(0, "bored"), "'bored'"),
         (lambda do: do.play(0, "nod", repetitions=0), "play: length must be positive"),
+        (
+            lambda do: do.play(0, "nod", repetitions="twice"),
+            "play: repetitions is not a number; got 'twice'; allowed > 0",
+        ),
+        (lambda do: do.play(0, "nod", seconds="2"), "play: seconds is not a number; got '2'; allowed > 0 s"),
+        (
+            lambda do: do.set_goal(0, (1, 1), radius="wide"),
+            "set_goal: radius is not a number; got 'wide'; allowed > 0 m",
+        ),
+        (lambda do: do.set_goal(0, (1, 1), radius=None), "set_goal: radius is not a number; got 'None'"),
+        (
+            lambda do: do.look_at(0, (1, 1, 1), trunk="half"),
+            "look_at: trunk is not a number; got 'half'; allowed 0 to 1",
+        ),
+        (lambda do: do.look_at(0, (1, 1, 1), trunk=[0.5, 0.5]), "look_at: trunk is not a number"),
+        (lambda do: do.look_at(0, (1, 1, 1), trunk=1.5), "look_at: trunk is out of range; got 1.5"),
+        (lambda do: do.reach(0, (1, 1, 1), seconds="1"), "reach: seconds is not a number; got '1'"),
+        (lambda do: do.reach(0, (1, 1, 1), hold="long"), "reach: hold is not a number; got 'long'"),
         (lambda do: do.end_reach(0, "foot"), "end_reach: unknown hand"),
     ],
 )
