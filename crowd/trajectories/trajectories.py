@@ -56,6 +56,12 @@ class Trajectories:
     ways: tuple[Way, ...]
     area: BaseGeometry | None = None
 
+    def __repr__(self) -> str:
+        people = len({way.number for way in self.ways})
+        times = np.unique(np.concatenate([np.zeros(0), *(way.time for way in self.ways)]))
+        seconds = float(np.ptp(times)) if times.size else 0.0
+        return f"Trajectories of {self.name}: {people} people, {times.size} frames, {seconds:.2f} s"
+
     @cached_property
     def first_time(self) -> float:
         """Time of the first sample, s."""

@@ -11,6 +11,7 @@ import crowd
 from crowd.cli import exit_code
 from crowd.errors import RecordingError
 from crowd.recording import Recorder
+from crowd.trajectories.trajectories import Trajectories, Way
 
 ROWS = [(frame, number, 0.1 * frame + number, 0.5 * number) for frame in range(20) for number in (3, 7)]
 RATE = 10.0
@@ -113,6 +114,18 @@ def test_a_broken_file_is_named_with_what_is_wrong(tmp_path, name, content, expe
         crowd.load_trajectories(tmp_path / name)
     assert str(caught.value).startswith(str(tmp_path / name))
     assert "\n" not in str(caught.value)
+
+
+def test_trajectories_are_shown_in_one_line(tmp_path):
+    write_csv(tmp_path / "tracks.csv")
+    trajectories = crowd.load_trajectories(tmp_path / "tracks.csv")
+    assert repr(trajectories) == "Trajectories of tracks.csv: 2 people, 20 frames, 1.90 s"
+    # Who comes back is one person, and two people of the same moment make one frame.
+    ways = tuple(
+        Way(number, time + np.arange(3.0), np.zeros((3, 2))) for number, time in ((1, 0), (2, 1), (1, 9))
+    )
+    assert repr(Trajectories("x", ways)) == "Trajectories of x: 2 people, 7 frames, 11.00 s"
+    assert repr(Trajectories("x", ())) == "Trajectories of x: 0 people, 0 frames, 0.00 s"
 
 
 def test_a_missing_file_is_named(tmp_path):
