@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from crowd.bench.sweep import largest_acceleration
+from crowd.blending.parameter_space import ParameterSpace
 from crowd.controllers.foot_lock import leg_arrays
+from crowd.controllers.locomotion import COMMAND_LIMITS
 from crowd.motion.body import STATURE, build_skeleton, draw_segment_scale
 from crowd.motion.clip import TOE_ROLL, ClipKind, FootEvent
 from crowd.motion.procedural import built_in_library
 from crowd.motion.procedural.shape import walk_cycle
 from crowd.motion.rotation import multiply, rotate
+from tests.oracles.example_sets import dense_weights
 
 LIBRARY = built_in_library()
 SKELETON = LIBRARY.skeleton
@@ -19,6 +22,8 @@ LOCOMOTION = LIBRARY.of_kind(ClipKind.LOCOMOTION)
 BY_NAME = {clip.name: clip for clip in LIBRARY.clips}
 SIDES = ("right", "left")
 STRIKES = (FootEvent.RHS, FootEvent.LHS)
+LARGEST_FOOT_STEP = 0.07
+"""By which a foot may move in a frame because a command changes, m."""
 TOE_OFFS = (FootEvent.RTO, FootEvent.LTO)
 FLATS = (FootEvent.RTS, FootEvent.LTS)
 
@@ -120,6 +125,34 @@ def test_parameters_are_those_of_the_root_and_the_loop_closes(clip):
     loop = np.concatenate([clip.rotation_local[-4:-1], clip.rotation_local[:4]])[:, None]
     inside = largest_acceleration(clip.rotation_local[:, None], clip.frame_rate)
     assert largest_acceleration(loop, clip.frame_rate) < 1.05 * inside + 20
+
+
+def feet_by_phase(clip, phases=40):
+    """Where the feet are at equal phases of the first cycle, (phases, 2, 3), in the root frame."""
+    position, _ = kinematics(clip)
+    frame = np.linspace(0, clip.cycle_duration * clip.frame_rate, phases, endpoint=False).astype(int)
+    return position[frame][:, [SKELETON.joint(f"{side}_foot") for side in SIDES]]
+
+
+def test_what_a_command_changes_in_a_frame_moves_feet_little(rng):
+    """No tetrahedron is so thin that a foot would be seen to jump as parameters pass through it."""
+    parameters = np.array([clip.parameters for clip in LOCOMOTION])
+    space = ParameterSpace.build(
+        parameters, np.array([clip.cycle_duration for clip in LOCOMOTION]), [clip.name for clip in LOCOMOTION]
+    )
+    shares = rng.dirichlet(np.ones(4), (40, space.simplex_count))
+    points = np.einsum("nsc,sca->nsa", shares, parameters[space.arrays.simplex]).reshape(-1, 3)
+    feet = np.array([feet_by_phase(clip) for clip in LOCOMOTION]).reshape(len(LOCOMOTION), -1)
+
+    def blended(at):
+        return (dense_weights(space, at) @ feet).reshape(len(at), -1, 3)
+
+    limits = COMMAND_LIMITS
+    largest = np.array([limits.braking, limits.turn_acceleration, limits.side_acceleration]) / 60.0
+    # A tenth of a frame, so that the step stays in thin tetrahedra, too.
+    for step in np.diag(0.1 * largest):
+        moved = np.linalg.norm(blended(points + step) - blended(points), axis=-1).max()
+        assert moved < 0.1 * LARGEST_FOOT_STEP
 
 
 @pytest.mark.parametrize("name", ["walk_slow", "walk", "walk_fast"])

@@ -69,7 +69,7 @@ NEEDS = (
             Need(
                 f"walking in a circle to the {word}",
                 lambda v, w, s, sign=sign: 0.2 <= v < 2.0 and sign * w > 0.3,  # type: ignore[misc]
-                (f"walk_circle_{word}", f"walk_tight_circle_{word}"),
+                (f"walk_circle_{word}", f"walk_slow_circle_{word}", f"walk_tight_circle_{word}"),
             ),
             Need(
                 f"running in a circle to the {word}",

@@ -21,7 +21,10 @@ from crowd.motion.skeleton import Skeleton
 WALKS = {"walk_slow": 0.7, "walk": 1.35, "walk_fast": 1.9}
 RUNS = {"jog": 2.5, "run": 3.6}
 BACK_WALKS = {"walk_back_slow": 0.5, "walk_back": 1.0}
-CIRCLES = {"walk_circle": (1.25, 40.0), "walk_tight_circle": (0.9, 110.0)}
+# An example just inside the line between two others makes thin tetrahedra with them: a little more turn takes
+# its weight from all to nothing, and legs jerk. So the tight circle lies outside the line from turning on the
+# spot to the tight run, and slow walks that weave need no share of a faster circle.
+CIRCLES = {"walk_circle": (1.25, 40.0), "walk_slow_circle": (0.7, 80.0), "walk_tight_circle": (1.25, 124.0)}
 RUN_CIRCLES = {"run_circle": (3.1, 50.0), "run_tight_circle": (2.4, 115.0)}
 SIDESTEPS = {"sidestep_slow": 0.5, "sidestep_fast": 1.1}
 TURN_RATE = 130.0
