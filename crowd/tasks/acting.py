@@ -25,6 +25,7 @@ from crowd.tasks.present_task import (
     task_of,
     wanted_hand,
 )
+from crowd.tasks.settle import settle_parameters
 from crowd.tasks.task_list import Hand, Target, TaskKind
 from crowd.tasks.waits import Outcome
 from crowd_kernels.reach_goal import NONE
@@ -78,7 +79,16 @@ def settle(tasks: Tasks, row: int, time: float) -> Outcome:
         return Outcome.NEXT
     if np.linalg.norm(state.position_world[row] - tasks.place_world[row]) > 3.0 * ARRIVAL_RADIUS:
         return Outcome.FAIL
-    simulation.commands.set_locomotion(row, (0.0, 0.0, 0.0))
+    # The way that is left, at once: a command to rest in between, for one frame only, would jerk the legs.
+    simulation.commands.set_locomotion(
+        row,
+        settle_parameters(
+            state.position_world[[row]],
+            state.yaw[[row]],
+            tasks.place_world[[row]],
+            tasks.place_yaw[[row]],
+        ),
+    )
     return Outcome.WAIT
 
 

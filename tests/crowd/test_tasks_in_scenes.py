@@ -60,6 +60,19 @@ def done(simulation):
     return [event.task for event in simulation.events if event.kind is EventKind.TASK_DONE]
 
 
+def test_the_last_steps_to_a_place_begin_without_a_halt(tmp_path):
+    simulation = scene(tmp_path, person("a", 0, 0, '{ pick_up = "can_1" }'))
+    state, directed = simulation.state, []
+    for _ in simulation.run(seconds=20.0):
+        if state.is_directed[0]:
+            directed.append(state.directed_parameter[0].copy())
+        elif directed:
+            break
+    assert len(directed) > 10
+    assert directed[0].any(), "a single step at rest would jerk the legs"
+    np.testing.assert_allclose(directed[0], directed[1], atol=0.1)
+
+
 def test_what_is_fetched_stands_on_the_table_afterwards(tmp_path):
     simulation = scene(tmp_path, person("ann", 0.0, 0.0, '{ pick_up = "can_1" }, { put_down = "table" }'))
     start = simulation.objects.position_world.copy()
