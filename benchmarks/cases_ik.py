@@ -115,6 +115,7 @@ def solve(crowd: Crowd) -> None:
         crowd.target_rotation,
         crowd.start,
         crowd.root,
+        crowd.pose,
         crowd.active,
         crowd.scratch,
         crowd.pose,

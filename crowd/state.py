@@ -259,6 +259,8 @@ class State:
     reach_correction: Float32Array = _array(3 * CORRECTED_JOINTS, dtype=np.float32)
     """What inverse kinematics turned joints against the blended motion in the last step: vector parts, x of
     all joints of the tree, then y, z; 0 for none. (character, 96)"""
+    reach_last_rotation: Float32Array = _array(4 * PADDED_JOINTS, dtype=np.float32)
+    """Joints as inverse kinematics left them in the last step; 0 for none. (character, 256)"""
 
     grab_stage: ByteArray = _array(2, dtype=np.uint8)
     """Stage of each hand, right and left: 0 open, 1 closing, 2 holding, 3 opening. (character, 2)"""

@@ -225,6 +225,7 @@ class Constraint:
             self._target_rotation,
             state.pose_rotation,
             state.pose_pelvis,
+            state.constraint_rotation,
             rows,
             self._scratch,
             state.constraint_rotation,

@@ -57,7 +57,13 @@ REACH_LIMITS = ReachLimits(
     example_rate=22.0,
 )
 SOLVE = SETTINGS._replace(
-    reach=1e3, damping=0.016, error_damping=0.4, turn_error_damping=6.0, pull_fade=1.0, place_first=0
+    reach=1e3,
+    damping=0.016,
+    error_damping=0.4,
+    turn_error_damping=6.0,
+    pull_fade=1.0,
+    place_first=0,
+    passes=8,
 )
 EFFECTORS = ("right_hand", "left_hand")
 FEWEST_EXAMPLES = 8
@@ -108,6 +114,7 @@ class Reach:
         "reach_count",
         "reach_checked_world",
         "reach_correction",
+        "reach_last_rotation",
         *(f"reach_{name}" for name in ReachState._fields),
     )
 
@@ -164,6 +171,7 @@ class Reach:
         state.reach_stage[characters] = NONE
         state.reach_status[characters] = NONE
         state.reach_correction[characters] = 0.0
+        state.reach_last_rotation[characters] = 0.0
 
     def start(
         self,
@@ -219,6 +227,7 @@ class Reach:
         is_new = state.reach_stage[characters, hands] == NONE
         rests = (state.reach_stage[characters] == NONE).all(axis=1)
         state.reach_correction[characters[rests]] = 0.0
+        state.reach_last_rotation[characters[rests]] = 0.0
         state.reach_status[characters, hands] = np.where(is_good, MOVING, REFUSED)
         state.reach_refusals[characters, hands] += ~is_good
         going = ~is_new | is_good
@@ -347,6 +356,7 @@ class Reach:
             state.reach_correction,
             state.pose_rotation,
             reaching,
+            state.reach_last_rotation,
             self._solution,
         )
         settings = self.settings.solve_for(dt)
@@ -365,6 +375,7 @@ class Reach:
                 self._target_rotation,
                 state.pose_rotation,
                 state.pose_pelvis,
+                state.reach_last_rotation,
                 rows,
                 self._solve_scratch,
                 self._solution,
@@ -374,7 +385,14 @@ class Reach:
                 self._angle,
                 self._iterations,
             )
-        keep_corrections(self._tree, self._solution, reaching, state.pose_rotation, state.reach_correction)
+        keep_corrections(
+            self._tree,
+            self._solution,
+            reaching,
+            state.pose_rotation,
+            state.reach_correction,
+            state.reach_last_rotation,
+        )
 
     def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:
         """Tell how the reaches stand."""

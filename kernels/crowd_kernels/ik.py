@@ -91,7 +91,8 @@ class SolveSettings(NamedTuple):
     passes: int
     """Solves of one iteration in which joints at their limits are fixed, 1 and more."""
     approach: float
-    """Largest share of the way to a limit that a joint goes in one iteration."""
+    """Largest share of what is left of the way from the last pose to a limit that a joint goes in one
+    iteration."""
     patience: float
     """Iterations with less than 1 % of progress after which a solve ends."""
 
@@ -197,6 +198,7 @@ def solve_block(
         iterations[lane] = ZERO
         stalled[lane] = ZERO
     pull = np.float32(settings.pull)
+    approached = ONE
     for iteration in range(settings.most_iterations + 1):
         place_joints(tree, scale, joints)
         for lane in range(LANES):
@@ -222,7 +224,8 @@ def solve_block(
         if sum_row(running) == ZERO or iteration == settings.most_iterations:
             break
         add_row(running, iterations)
-        free_joints(tree, pull, np.float32(settings.pull_step), joints)
+        approached *= ONE - np.float32(settings.approach)
+        free_joints(tree, pull, np.float32(settings.pull_step), ONE - approached, joints)
         for _ in range(settings.passes):
             if root_weight > ZERO:
                 root_pull_row(
@@ -233,7 +236,7 @@ def solve_block(
                 )
             build_system(tree, parts, joints, effectors, system[:used], push)
             solve_system(parts * count, parts, damping, system, push)
-            turn_joints(tree, np.float32(settings.approach), joints, effectors, push, running, error)
+            turn_joints(tree, joints, effectors, push, running, missing, error)
             if sum_row(error) == ZERO:
                 break
         pull *= np.float32(settings.pull_fade)
@@ -274,6 +277,7 @@ def solve_chunk(
     target_rotation: Any,
     reference_rotation: Any,
     reference_root: Any,
+    last_rotation: Any,
     active: Any,
     begin: int,
     end: int,
@@ -321,6 +325,7 @@ def solve_chunk(
             segment_scale,
             pose_rotation,
             reference_rotation,
+            last_rotation,
             root_position,
             active,
             first,
@@ -383,6 +388,7 @@ def solve_crowd(
     target_rotation: Any,
     reference_rotation: Any,
     reference_root: Any,
+    last_rotation: Any,
     active: Any,
     scratch: Any,
     pose_rotation: Any,
@@ -412,6 +418,8 @@ def solve_crowd(
         Pose that is followed as far as the targets allow. May be `pose_rotation`.
     reference_root : (N, 3) float32
         Position that the root is drawn to where it may move, at scale 1, m. May be `root_position`.
+    last_rotation : (N, L) float32
+        Pose from which joints approach their limits: that of the step before, or again `pose_rotation`.
     active : (A,) int32
         Characters to process, each once; 0 to N - 1.
     scratch : (32, scratch_length(K, E, G)) float32
@@ -455,6 +463,7 @@ def solve_crowd(
             target_rotation,
             reference_rotation,
             reference_root,
+            last_rotation,
             active,
             chunk * block_count // CHUNKS,
             (chunk + 1) * block_count // CHUNKS,

@@ -8,6 +8,7 @@ from crowd_kernels._jit import kernel
 from crowd_kernels.ik_layout import (
     FRAME,
     LENGTH,
+    NEXT,
     ONE,
     PLACE,
     POINT,
@@ -130,13 +131,14 @@ def gather_joints(
     segment_scale: Any,
     pose_rotation: Any,
     reference_rotation: Any,
+    last_rotation: Any,
     root_position: Any,
     active: Any,
     first: int,
     out_scale: Any,
     out_joints: Any,
 ) -> None:
-    """Read proportions, pose and reference of 16 active characters.
+    """Read proportions, pose, reference and last pose of 16 active characters.
 
     Parameters
     ----------
@@ -161,12 +163,14 @@ def gather_joints(
             out_joints[0, PLACE + axis * LANES + lane] = root_position[character, axis] * scale
         pose = pose_rotation[character]
         reference = reference_rotation[character]
+        last = last_rotation[character]
         for k in range(tree.joint.shape[0]):
             begin = tree.joint[k] * tree.joint_step
             for component in range(4):
                 index = begin + component * tree.component_step
                 out_joints[k + 1, ROTATION + component * LANES + lane] = pose[index]
                 out_joints[k + 1, REFERENCE + component * LANES + lane] = reference[index]
+                out_joints[k + 1, NEXT + component * LANES + lane] = last[index]
     out_joints[0, FRAME : FRAME + LANES] = ONE
     out_joints[0, FRAME + LANES : FRAME + 4 * LANES] = ZERO
     for k in range(tree.joint.shape[0]):

@@ -8,9 +8,11 @@ from crowd_kernels._jit import inlined_kernel
 from crowd_kernels.ik_joint import moved
 from crowd_kernels.ik_layout import (
     DRIFT,
+    EXCESS,
     FRAME,
     HELD,
     IS_FIXED,
+    LAST,
     MOBILITY,
     NEXT,
     NEXT_SWING,
@@ -33,8 +35,12 @@ from crowd_kernels.lanes import LANES
 from crowd_kernels.quaternion import Quaternion, conjugate, multiply, rotate
 from crowd_kernels.vector import Vector, dot
 
-FREE_SHARE: Any = np.float32(1e-3)
+FREE_SHARE: Any = np.float32(0.1)
+"""Share of a direction that must be left to be fixed. Beside the end of a curved limit another direction, at
+a small angle to the first, would be fixed as well, and the joint would not slide along the limit."""
 SLACK: Any = np.float32(2e-5)
+GRAVE: Any = np.float32(0.3)
+"""Share of the largest excess from which directions are fixed."""
 
 
 @inlined_kernel
@@ -60,7 +66,7 @@ def begin_fixing_row(weight: Any, row: Any) -> None:
 
 
 @inlined_kernel
-def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, weight: Any, share: Any) -> None:
+def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, weight: Any, share: Any) -> Any:
     """Let a joint turn along one direction by a given amount, whatever the torque.
 
     Parameters
@@ -77,12 +83,18 @@ def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, weight: Any,
         fixed already.
     share : float32
         1 to do it, 0 to leave the joint as it is.
+
+    Returns
+    -------
+    float32
+        1 where it was done, else 0.
     """
     first = MOBILITY + lane
     mx, my, mz = moved(row, lane, normal)
     pivot = normal[0] * mx + normal[1] * my + normal[2] * mz
     least = FREE_SHARE * weight * dot(normal, normal) + TINY
-    inverse = share / max(pivot, least) if pivot > least else ZERO
+    share = share if pivot > least else ZERO
+    inverse = share / max(pivot, least)
     drift = vector_at(row, DRIFT, lane)
     factor = (motion - dot(normal, drift)) * inverse
     put_vector(row, DRIFT, lane, (drift[0] + mx * factor, drift[1] + my * factor, drift[2] + mz * factor))
@@ -92,6 +104,7 @@ def fix_direction(row: Any, lane: int, normal: Vector, motion: Any, weight: Any,
     row[first + 3 * LANES] -= my * my * inverse
     row[first + 4 * LANES] -= my * mz * inverse
     row[first + 5 * LANES] -= mz * mz * inverse
+    return share
 
 
 @inlined_kernel
@@ -104,7 +117,7 @@ def hold_reference_row(
     high: Any,
     row: Any,
 ) -> None:
-    """Note swing and twist of the reference pose, and widen limits that it leaves.
+    """Note swing and twist of the reference and of the last pose, and widen limits that the reference leaves.
 
     Parameters
     ----------
@@ -114,9 +127,12 @@ def hold_reference_row(
     low, high : float32
         See `LimitArrays.twist`.
     row : (JOINT_ROW,) float32
-        The joint: bounds and held values are written.
+        The joint, with the last pose's rotation as its next: bounds, held and last values are written.
     """
     for lane in range(LANES):
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
+        row[LAST + lane] = np.sqrt(x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y)
+        row[LAST + LANES + lane] = twist
         x, y, twist = split(into_limit(parent_frame, quaternion_at(row, REFERENCE, lane), joint_frame))
         row[SWING_BOUND + lane] = max(ONE, x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y)
         row[TWIST_BOUND + lane] = min(low, twist)
@@ -161,25 +177,39 @@ def lock_axis_row(
 
 
 @inlined_kernel
+def find_room_row(approach: Any, row: Any) -> None:
+    """Find how near to its limits a joint may come in this iteration, so that it comes to rest there softly.
+
+    Parameters
+    ----------
+    approach : float32
+        Largest share of the way from the last pose to a limit.
+    row : (JOINT_ROW,) float32
+        The joint: its room is written.
+    """
+    for lane in range(LANES):
+        bound, last = row[SWING_BOUND + lane], row[LAST + lane]
+        radius = last + approach * max(np.sqrt(bound) - last, ZERO)
+        low, high = row[TWIST_BOUND + lane], row[TWIST_BOUND + LANES + lane]
+        last = row[LAST + LANES + lane]
+        low = max(low, last + approach * min(low - last, ZERO))
+        high = min(high, last + approach * max(high - last, ZERO))
+        put_vector(row, ROOM, lane, (min(radius * radius, bound), low, high))
+
+
+@inlined_kernel
 def find_limit_row(
-    parent_frame: Quaternion,
-    joint_frame: Quaternion,
-    inverse_x: Any,
-    inverse_y: Any,
-    approach: Any,
-    row: Any,
+    parent_frame: Quaternion, joint_frame: Quaternion, inverse_x: Any, inverse_y: Any, row: Any
 ) -> bool:
-    """Find swing and twist of a joint's next rotation, and how far they may go in this iteration.
+    """Find swing and twist of a joint's next rotation.
 
     Parameters
     ----------
     parent_frame, joint_frame : tuple of float32
     inverse_x, inverse_y : float32
         See `LimitArrays.inverse_swing`.
-    approach : float32
-        Largest share of the way to a limit that the joint goes now.
     row : (JOINT_ROW,) float32
-        The joint: next swing and room are written.
+        The joint, after `find_room_row`: next swing is written.
 
     Returns
     -------
@@ -188,21 +218,40 @@ def find_limit_row(
     """
     is_outside = False
     for lane in range(LANES):
-        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, ROTATION, lane), joint_frame))
-        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
-        bound = row[SWING_BOUND + lane]
-        # Up to a share of the way to the limit, so that joints come to rest there softly.
-        radius = np.sqrt(value) + approach * max(np.sqrt(bound) - np.sqrt(value), ZERO)
-        bound = min(radius * radius, bound)
-        low, high = row[TWIST_BOUND + lane], row[TWIST_BOUND + LANES + lane]
-        low = max(low, twist + approach * min(low - twist, ZERO))
-        high = min(high, twist + approach * max(high - twist, ZERO))
-        put_vector(row, ROOM, lane, (bound, low, high))
+        bound, low, high = vector_at(row, ROOM, lane)
         x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
         put_vector(row, NEXT_SWING, lane, (x, y, twist))
         value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
         is_outside |= (value > bound) | (twist > high) | (twist < low)
     return is_outside
+
+
+@inlined_kernel
+def excess_row(inverse_x: Any, inverse_y: Any, free_twist: Any, row: Any, out_largest: Any) -> None:
+    """Find how far a joint's next rotation is beyond its room.
+
+    Parameters
+    ----------
+    inverse_x, inverse_y : float32
+        See `LimitArrays.inverse_swing`.
+    free_twist : float32
+        See `LimitArrays.is_free`.
+    row : (JOINT_ROW,) float32
+        The joint, after `find_limit_row`: its excess is written, 0 within the room.
+    out_largest : (16,) float32
+        Largest excess of all joints, in and out, rad.
+    """
+    for lane in range(LANES):
+        x, y, twist = vector_at(row, NEXT_SWING, lane)
+        bound, low, high = vector_at(row, ROOM, lane)
+        value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
+        swing = TWO * np.sqrt(x * x + y * y) * (ONE - np.sqrt(bound / max(value, bound)))
+        swing = swing if value > bound + SLACK * bound else ZERO
+        twist = max(twist - high, low - twist)
+        twist = TWO * free_twist * twist if twist > SLACK else ZERO
+        row[EXCESS + lane] = swing
+        row[EXCESS + LANES + lane] = twist
+        out_largest[lane] = max(out_largest[lane], swing, twist)
 
 
 @inlined_kernel
@@ -217,6 +266,7 @@ def limit_row(
     free_y: Any,
     free_twist: Any,
     is_running: Any,
+    largest: Any,
     row: Any,
     out_violations: Any,
 ) -> None:
@@ -235,9 +285,11 @@ def limit_row(
         See `LimitArrays.is_free`.
     is_running : (16,) float32
         0 where the character stays as it is.
+    largest : (16,) float32
+        Largest excess of all joints, rad. Directions are fixed where it is not much more than their own:
+        others may come back by themselves when the worst ones are fixed.
     row : (JOINT_ROW,) float32
-        The joint, after `find_limit_row`: its next rotation is projected; drift and mobility lose what is
-        fixed.
+        The joint, after `excess_row`: its next rotation is projected; drift and mobility lose what is fixed.
     out_violations : (16,) float32
         Grows by the number of directions that were fixed.
 
@@ -253,9 +305,10 @@ def limit_row(
         value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
         is_inside = (value <= bound) & (twist >= low) & (twist <= high) & (is_free > ZERO)
         share = np.sqrt(bound / max(value, bound))
-        swings_out = is_running[lane] if value > bound + SLACK * bound else ZERO
-        twists_out = is_running[lane] if (twist > high + SLACK) | (twist < low - SLACK) else ZERO
-        twists_out *= free_twist
+        swing_excess, twist_excess = row[EXCESS + lane], row[EXCESS + LANES + lane]
+        least = max(GRAVE * largest[lane], TINY)
+        swings_out = is_running[lane] if swing_excess >= least else ZERO
+        twists_out = is_running[lane] if twist_excess >= least else ZERO
         x = held[0] + free_x * (x * share - held[0])
         y = held[1] + free_y * (y * share - held[1])
         twist = held[2] + free_twist * (min(max(twist, low), high) - held[2])
@@ -288,7 +341,7 @@ def limit_row(
         motion = rotate(outer, (way[1] * scale, way[2] * scale, way[3] * scale))
         frame = multiply(outer, parent_frame)
         normal = rotate(frame, swing_normal(x, y, x * inverse_x * inverse_x, y * inverse_y * inverse_y))
-        fix_direction(row, lane, normal, dot(normal, motion), weight, swings_out)
+        swings_out = fix_direction(row, lane, normal, dot(normal, motion), weight, swings_out)
         normal = rotate(frame, twist_normal(x, y))
-        fix_direction(row, lane, normal, dot(normal, motion), weight, twists_out)
+        twists_out = fix_direction(row, lane, normal, dot(normal, motion), weight, twists_out)
         out_violations[lane] += swings_out + twists_out

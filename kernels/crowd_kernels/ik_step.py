@@ -19,8 +19,15 @@ from crowd_kernels.ik_effector import (
 from crowd_kernels.ik_gather import frame_of
 from crowd_kernels.ik_joint import forward_row, free_step_row, pull_row, rest_row, step_row
 from crowd_kernels.ik_lanes import clear_row
-from crowd_kernels.ik_layout import BLOCK, IS_FIXED, ZERO
-from crowd_kernels.ik_limit import begin_fixing_row, find_limit_row, limit_row, lock_axis_row
+from crowd_kernels.ik_layout import BLOCK, IS_FIXED, IS_OUTSIDE, ONE, ZERO
+from crowd_kernels.ik_limit import (
+    begin_fixing_row,
+    excess_row,
+    find_limit_row,
+    find_room_row,
+    limit_row,
+    lock_axis_row,
+)
 from crowd_kernels.ik_root import root_accumulate_row, root_subtract_row
 from crowd_kernels.ik_system import block_of
 from crowd_kernels.ik_tree import TreeArrays
@@ -52,8 +59,8 @@ def place_joints(tree: TreeArrays, scale: Any, joints: Any) -> None:
 
 
 @kernel
-def free_joints(tree: TreeArrays, gain: Any, bound: Any, joints: Any) -> None:
-    """Set drift and mobility of all joints of a block for a new iteration.
+def free_joints(tree: TreeArrays, gain: Any, bound: Any, approach: Any, joints: Any) -> None:
+    """Set drift, mobility and room of all joints of a block for a new iteration.
 
     Parameters
     ----------
@@ -62,6 +69,8 @@ def free_joints(tree: TreeArrays, gain: Any, bound: Any, joints: Any) -> None:
         Share of the way to the reference pose.
     bound : float32
         Largest rotation towards it, rad.
+    approach : float32
+        Largest share of the way from the last pose to a limit that a joint goes.
     joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
     """
@@ -71,6 +80,7 @@ def free_joints(tree: TreeArrays, gain: Any, bound: Any, joints: Any) -> None:
         above = joints[tree.parent[k] + 1]
         pull_row(above, gain, bound, joints[k + 1])
         if tree.is_limited[k]:
+            find_room_row(approach, joints[k + 1])
             for axis in range(3):
                 if tree.is_free[k, axis] == ZERO:
                     if joints[k + 1, IS_FIXED] == ZERO:
@@ -170,11 +180,11 @@ def build_system(
 @kernel
 def turn_joints(
     tree: TreeArrays,
-    approach: Any,
     joints: Any,
     effectors: Any,
     push: Any,
     running: Any,
+    largest: Any,
     out_violations: Any,
 ) -> None:
     """Find the next rotations of all joints, and fix those that would leave their limits.
@@ -182,8 +192,6 @@ def turn_joints(
     Parameters
     ----------
     tree : TreeArrays
-    approach : float32
-        See `SolveSettings`.
     joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
     effectors : (E, EFFECTOR_ROW) float32
@@ -191,10 +199,13 @@ def turn_joints(
         Solution of the system.
     running : (16,) float32
         0 where the character stays as it is.
+    largest : (16,) float32
+        Scratch.
     out_violations : (16,) float32
         Number of directions that were fixed.
     """
     clear_row(out_violations)
+    clear_row(largest)
     for k in range(tree.joint.shape[0]):
         if tree.weight[k] <= ZERO:
             continue
@@ -212,16 +223,26 @@ def turn_joints(
             step_row(above, running, joints[k + 1])
         if not tree.is_limited[k]:
             continue
-        is_free = tree.is_free[k, 0] * tree.is_free[k, 1] * tree.is_free[k, 2] > ZERO
         is_outside = find_limit_row(
             frame_of(tree.parent_frame, k),
             frame_of(tree.joint_frame, k),
             tree.inverse_swing[k, 0],
             tree.inverse_swing[k, 1],
-            approach,
             joints[k + 1],
         )
+        is_free = tree.is_free[k, 0] * tree.is_free[k, 1] * tree.is_free[k, 2] > ZERO
+        joints[k + 1, IS_OUTSIDE] = ZERO
         if is_outside or not is_free:
+            joints[k + 1, IS_OUTSIDE] = ONE
+            excess_row(
+                tree.inverse_swing[k, 0],
+                tree.inverse_swing[k, 1],
+                tree.is_free[k, 2],
+                joints[k + 1],
+                largest,
+            )
+    for k in range(tree.joint.shape[0]):
+        if tree.weight[k] > ZERO and tree.is_limited[k] and joints[k + 1, IS_OUTSIDE] != ZERO:
             if joints[k + 1, IS_FIXED] == ZERO:
                 begin_fixing_row(tree.weight[k], joints[k + 1])
             limit_row(
@@ -235,6 +256,7 @@ def turn_joints(
                 tree.is_free[k, 1],
                 tree.is_free[k, 2],
                 running,
+                largest,
                 joints[k + 1],
                 out_violations,
             )

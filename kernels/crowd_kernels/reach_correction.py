@@ -54,6 +54,22 @@ def kept_of(tree: TreeArrays, task: Any, kept: Any, k: int) -> Any:
     return share
 
 
+@inlined_kernel
+def mixed_rotation(last: Quaternion, start: Quaternion, share: Any) -> Quaternion:
+    """Mix the rotation of the last step, by a share, with that from which this one starts; 0 for none."""
+    dot = last[0] * start[0] + last[1] * start[1] + last[2] * start[2] + last[3] * start[3]
+    own = share if dot >= ZERO else -share
+    rest = ONE - share if dot != ZERO else ONE
+    return unit_quaternion(
+        (
+            own * last[0] + rest * start[0],
+            own * last[1] + rest * start[1],
+            own * last[2] + rest * start[2],
+            own * last[3] + rest * start[3],
+        )
+    )
+
+
 @parallel_kernel
 def start_solves(
     tree: TreeArrays,
@@ -62,6 +78,7 @@ def start_solves(
     correction: Any,
     pose_rotation: Any,
     active: Any,
+    last_rotation: Any,
     out_rotation: Any,
 ) -> None:
     """Turn blended poses by the last corrections: where the next solves start.
@@ -80,6 +97,9 @@ def start_solves(
         Blended poses, unit quaternions.
     active : (A,) int32
         Characters to process, each once; 0 to N - 1.
+    last_rotation : (N, L) float32
+        In: last solutions, 0 for none. Out: poses from which joints shall approach their limits, the last
+        solutions where all of the correction is kept, and near to where the solves start where little is.
     out_rotation : (N, L) float32
         Joints of the tree are written.
 
@@ -95,6 +115,7 @@ def start_solves(
         for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             character = active[index]
             row = correction[character]
+            is_new = last_rotation[character, tree.joint[0] * tree.joint_step] == ZERO
             for k in range(tree.joint.shape[0]):
                 rotation = joint_rotation(tree, k, pose_rotation[character])
                 share = kept_of(tree, task[character], kept[character], k)
@@ -103,11 +124,16 @@ def start_solves(
                     w = np.sqrt(max(ONE - x * x - y * y - z * z, ZERO))
                     rotation = unit_quaternion(multiply((w, x, y, z), rotation))
                 set_joint_rotation(tree, k, rotation, out_rotation[character])
+                if share < ONE or is_new:
+                    last = joint_rotation(tree, k, last_rotation[character])
+                    # A hand that is nearly back comes to the blended motion in time, beside any limit.
+                    last = mixed_rotation(last, rotation, share * share)
+                    set_joint_rotation(tree, k, last, last_rotation[character])
 
 
 @parallel_kernel
 def keep_corrections(
-    tree: TreeArrays, solution: Any, active: Any, pose_rotation: Any, out_correction: Any
+    tree: TreeArrays, solution: Any, active: Any, pose_rotation: Any, out_correction: Any, out_last: Any
 ) -> None:
     """Take solutions into the poses, and keep how they are turned against the blended ones.
 
@@ -123,6 +149,8 @@ def keep_corrections(
         In: the blended poses. Out: the solutions, at joints that the tree turns.
     out_correction : (N, 96) float32
         Laid out as in `start_solves`.
+    out_last : (N, L) float32
+        The solutions, at joints that the tree turns.
 
     Notes
     -----
@@ -144,3 +172,4 @@ def keep_corrections(
                 row[LANES + k] = sign * y
                 row[2 * LANES + k] = sign * z
                 set_joint_rotation(tree, k, solved, pose_rotation[character])
+                set_joint_rotation(tree, k, solved, out_last[character])

@@ -53,7 +53,7 @@ def resting(tree):
 class Crowd:
     """Arguments of `solve_crowd` for one tree and given poses (N, K, 4)."""
 
-    def __init__(self, tree, start, reference=None):
+    def __init__(self, tree, start, reference=None, last=None):
         self.tree, self.count = tree, len(start)
         effectors = len(tree.effector)
         segments = 8 if tree.component_step > 1 else 1
@@ -64,6 +64,7 @@ class Crowd:
         self.target_rotation = np.tile(np.array([1, 0, 0, 0], np.float32), (self.count, effectors, 1))
         self.pose = self.rows(start)
         self.reference = self.rows(start if reference is None else reference)
+        self.last = self.pose if last is None else self.rows(last)
         self.root = np.zeros((self.count, 3), np.float32)
         self.active = np.arange(self.count, dtype=np.int32)
         length = scratch_length(len(tree.joint), effectors, segments)
@@ -119,8 +120,8 @@ class Crowd:
     def solve(self, build=solve_crowd, **settings):
         build(
             self.tree, SETTINGS._replace(**settings), self.scale, self.task, self.point, self.target,
-            self.target_rotation, self.reference, self.root, self.active, self.scratch, self.pose, self.root,
-            self.status, self.distance, self.angle, self.iterations,
+            self.target_rotation, self.reference, self.root, self.last, self.active, self.scratch, self.pose,
+            self.root, self.status, self.distance, self.angle, self.iterations,
         )  # fmt: skip
         return self
 
@@ -153,6 +154,8 @@ def test_one_iteration_matches_the_slow_twin(
     start = np.array([random_pose(tree, rng) for _ in range(24)])
     crowd.pose = crowd.rows(start)
     crowd.reference = crowd.rows(np.tile(resting(tree), (24, 1, 1)))
+    last = np.array([random_pose(tree, rng) for _ in range(24)])
+    crowd.last = crowd.rows(last)
     crowd.task[:] = task
     settings = SETTINGS._replace(
         most_iterations=1,
@@ -163,7 +166,7 @@ def test_one_iteration_matches_the_slow_twin(
     crowd.solve(**settings._asdict())
     for character, got in enumerate(crowd.local()):
         wanted = oracle.iterate(
-            tree, settings, start[character], resting(tree), crowd.point[character],
+            tree, settings, start[character], resting(tree), last[character], crowd.point[character],
             crowd.target[character], crowd.target_rotation[character], crowd.task[character],
         )  # fmt: skip
         for k in np.flatnonzero(tree.weight > 0):

@@ -118,7 +118,7 @@ class Problem:
         solve_crowd(
             self.tree, SETTINGS._replace(**how), np.ones((LANES, 1), np.float32), self.task, self.point,
             self.target, self.target_rotation, self.reference.reshape(LANES, -1).astype(np.float32), root,
-            np.arange(LANES, dtype=np.int32), self.scratch, pose, root, self.status, self.distance,
+            pose, np.arange(LANES, dtype=np.int32), self.scratch, pose, root, self.status, self.distance,
             self.angle, np.zeros(LANES, np.int32),
         )  # fmt: skip
         return pose.reshape(LANES, -1, 4).astype(float)
@@ -189,8 +189,8 @@ def test_one_step_is_that_of_the_slow_twin(seed):
     poses = problem.solve(**how._asdict())
     for row in {0, LANES - 1} & set(np.flatnonzero(problem.task.any(axis=1)).tolist()):
         wanted = oracle.iterate(
-            tree, how, problem.start[row], problem.reference[row], problem.point[row], problem.target[row],
-            problem.target_rotation[row], problem.task[row],
+            tree, how, problem.start[row], problem.reference[row], problem.start[row], problem.point[row],
+            problem.target[row], problem.target_rotation[row], problem.task[row],
         )  # fmt: skip
         for k in np.flatnonzero(tree.moves.any(axis=0)):
             off = (oracle.rotation(poses[row, k]) * oracle.rotation(wanted[k]).inv()).magnitude()

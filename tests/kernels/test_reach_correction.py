@@ -43,12 +43,19 @@ def test_solves_start_from_the_corrected_blend(seed):
     correction = rng.uniform(-0.5, 0.5, (COUNT, 3 * LANES)).astype(np.float32)
     task = rng.integers(0, 4, (COUNT, 2)).astype(np.uint8)
     share = rng.uniform(0.0, 1.0, (COUNT, 2)).astype(np.float32)
-    start_solves(TREE, task, share, correction, pose, ACTIVE, start)
+    last = poses(rng)
+    last[2] = 0.0
+    before = last.copy()
+    start_solves(TREE, task, share, correction, pose, ACTIVE, last, start)
     for i in ACTIVE:
         wanted = oracle.started(TREE, task[i], share[i], vectors(correction[i]), local(pose[i]))
         same = np.abs(np.sum(wanted * local(start[i]), axis=1))
         np.testing.assert_allclose(same, 1.0, atol=1e-6)
+        wanted = oracle.last(TREE, task[i], share[i], local(before[i]), local(start[i]))
+        same = np.abs(np.sum(wanted * local(last[i]), axis=1))
+        np.testing.assert_allclose(same, 1.0, atol=1e-5)
     assert np.isnan(start[INACTIVE]).all()
+    np.testing.assert_array_equal(last[INACTIVE], before[INACTIVE])
 
 
 @given(SEEDS)
@@ -56,7 +63,8 @@ def test_what_is_kept_brings_the_blend_to_the_solution_again(seed):
     rng = np.random.default_rng(seed)
     solution, pose = poses(rng), poses(rng)
     before, correction = pose.copy(), np.zeros((COUNT, 3 * LANES), np.float32)
-    keep_corrections(TREE, solution, ACTIVE, pose, correction)
+    last = np.zeros_like(pose)
+    keep_corrections(TREE, solution, ACTIVE, pose, correction, last)
     turning = TREE.weight > 0
     for i in ACTIVE:
         wanted = oracle.kept(TREE, local(solution[i]), local(before[i]))
@@ -64,6 +72,7 @@ def test_what_is_kept_brings_the_blend_to_the_solution_again(seed):
         clear = np.linalg.norm(wanted, axis=1) < 0.999
         np.testing.assert_allclose(vectors(correction[i])[clear], wanted[clear], atol=1e-5)
         np.testing.assert_array_equal(local(pose[i])[turning], local(solution[i])[turning])
+        np.testing.assert_array_equal(local(last[i])[turning], local(solution[i])[turning])
         np.testing.assert_array_equal(local(pose[i])[~turning], local(before[i])[~turning])
         again = oracle.started(TREE, BOTH[i], WHOLE[i], vectors(correction[i]), local(before[i]))
         same = np.abs(np.sum(again * local(pose[i]), axis=1))
@@ -78,10 +87,11 @@ def test_what_is_kept_brings_the_blend_to_the_solution_again(seed):
 def test_no_correction_leaves_the_pose_as_it_is(rng):
     pose, start = poses(rng), np.zeros((COUNT, 4 * PADDED_JOINTS), np.float32)
     correction = np.zeros((COUNT, 3 * LANES), np.float32)
-    start_solves(TREE, BOTH, WHOLE, correction, pose, ACTIVE, start)
+    last = np.zeros_like(pose)
+    start_solves(TREE, BOTH, WHOLE, correction, pose, ACTIVE, last, start)
     for i in ACTIVE:
         np.testing.assert_allclose(local(start[i]), local(pose[i]), atol=1e-6)
-    keep_corrections(TREE, pose.copy(), ACTIVE, pose, correction)
+    keep_corrections(TREE, pose.copy(), ACTIVE, pose, correction, last)
     assert np.abs(correction).max() < 1e-6
 
 
@@ -90,8 +100,9 @@ def test_an_arm_without_a_task_keeps_no_correction(rng):
     pose, start = poses(rng), np.zeros((COUNT, 4 * PADDED_JOINTS), np.float32)
     correction = np.full((COUNT, 3 * LANES), 0.2, np.float32)
     right = np.tile(np.array([1, 0], np.uint8), (COUNT, 1))
-    start_solves(TREE, right, WHOLE, correction, pose, ACTIVE, start)
-    keep_corrections(TREE, start, ACTIVE, pose, correction)
+    last = np.zeros_like(pose)
+    start_solves(TREE, right, WHOLE, correction, pose, ACTIVE, last, start)
+    keep_corrections(TREE, start, ACTIVE, pose, correction, last)
     only_left = (TREE.moves[1] > 0) & (TREE.moves[0] == 0)
     for i in ACTIVE:
         kept = np.abs(vectors(correction[i])).max(axis=1)

@@ -58,8 +58,10 @@ ARITHMETIC_LEAVES |= {
     ik_effector.add_torque_row: (ROW, ROW, numba.boolean, ROW),
     ik_joint.step_row: (ROW, ROW, ROW),
     ik_joint.free_step_row: (ROW, NUMBER, ROW, ROW),
-    ik_limit.find_limit_row: (QUATERNION, QUATERNION, *[NUMBER] * 3, ROW),
-    ik_limit.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW),
+    ik_limit.find_room_row: (NUMBER, ROW),
+    ik_limit.find_limit_row: (QUATERNION, QUATERNION, *[NUMBER] * 2, ROW),
+    ik_limit.excess_row: (*[NUMBER] * 3, ROW, ROW),
+    ik_limit.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW, ROW),
     ik_system.subtract_block: (ROW, ROW, ROW),
 }
 SHUFFLE_LEAVES = {

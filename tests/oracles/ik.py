@@ -91,13 +91,14 @@ class Motion:
         """Take out a direction along which the rotation vector is given."""
         along = self.mobility @ normal
         pivot = normal @ along
-        if pivot <= 1e-3 * self.weight * (normal @ normal) + 1e-12:
-            return
+        if pivot <= 0.1 * self.weight * (normal @ normal) + 1e-12:
+            return False
         self.drift = self.drift + along * (motion - normal @ self.drift) / pivot
         self.mobility = self.mobility - np.outer(along, along) / pivot
+        return True
 
 
-def iterate(tree, settings, local, reference, point, target, target_rotation, task):
+def iterate(tree, settings, local, reference, last, point, target, target_rotation, task):
     """One iteration of the solver; returns the new local rotations (K, 4)."""
     count, effectors = len(tree.joint), len(tree.effector)
     places, frames = kinematics(tree.parent, tree.offset, local)
@@ -149,45 +150,49 @@ def iterate(tree, settings, local, reference, point, target, target_rotation, ta
         drift = np.concatenate([motion.drift for motion in motions])
         system = jacobian @ weights @ jacobian.T + np.diag(damping)
         step = drift + weights @ jacobian.T @ np.linalg.solve(system, miss - jacobian @ drift)
-        found, is_done = [], True
+        found, excess = [], np.zeros((count, 2))
         for k in range(count):
             half = outers[k].inv().apply(step[3 * k : 3 * k + 3]) / 2
             after = Rotation.from_quat([*half, 1.0]) * rotation(local[k])
             if tree.is_limited[k] and tree.weight[k] > 0:
-                after, broken = inside(tree, k, quaternion(after), reference[k], local[k], settings.approach)
-                way = quaternion(after * rotation(local[k]).inv())
-                motion = outers[k].apply(2 * way[1:] / way[0])
-                gradient = normals(tree, k, quaternion(after), outers[k])
-                for normal, is_broken in zip((gradient[0], gradient[3]), broken, strict=True):
-                    if is_broken:
-                        motions[k].fix(normal, normal @ motion)
-                        is_done = False
+                after, excess[k] = inside(
+                    tree, k, quaternion(after), reference[k], last[k], settings.approach
+                )
             found.append(quaternion(after))
+        is_done = True
+        for k, limit in np.argwhere((excess > 0) & (excess >= 0.3 * excess.max())):
+            way = quaternion(rotation(found[k]) * rotation(local[k]).inv())
+            motion = outers[k].apply(2 * way[1:] / way[0])
+            normal = normals(tree, k, found[k], outers[k])[3 * limit]
+            is_done &= not motions[k].fix(normal, normal @ motion)
         if is_done:
             break
     return np.array(found)
 
 
-def inside(limits, k, local, reference, before, approach):
-    """Projection of a joint into what limits leave to it, and whether swing and twist had to be changed."""
+def inside(limits, k, local, reference, last, approach):
+    """Projection of a joint into what limits leave to it, and how far swing and twist were beyond, rad."""
     swing, twist = split(limits, k, local)
     held_swing, held_twist = split(limits, k, reference)
     low, high = 2 * np.arctan(np.asarray(limits.twist[k], float))
     low, high = min(low, held_twist), max(high, held_twist)
     bound = max(1.0, np.linalg.norm(held_swing * limits.inverse_swing[k]))
-    swing_before, twist_before = split(limits, k, before)
-    value = np.linalg.norm(swing_before * limits.inverse_swing[k])
+    last_swing, last_twist = split(limits, k, last)
+    value = np.linalg.norm(last_swing * limits.inverse_swing[k])
     bound = min(bound, value + approach * max(bound - value, 0))
-    before = np.tan(twist_before / 2)
+    last = np.tan(last_twist / 2)
     ends = np.tan(np.array([low, high]) / 2)
-    low = 2 * np.arctan(max(ends[0], before + approach * min(ends[0] - before, 0)))
-    high = 2 * np.arctan(min(ends[1], before + approach * max(ends[1] - before, 0)))
+    low = 2 * np.arctan(max(ends[0], last + approach * min(ends[0] - last, 0)))
+    high = 2 * np.arctan(min(ends[1], last + approach * max(ends[1] - last, 0)))
     value = np.linalg.norm(swing * limits.inverse_swing[k])
     free_x, free_y, free_twist = limits.is_free[k]
     tangents = np.tan(np.array([low, twist, high]) / 2)
-    is_twisted = free_twist > 0 and not tangents[0] - 2e-5 <= tangents[1] <= tangents[2] + 2e-5
-    broken = (value**2 > bound**2 * (1 + 2e-5), is_twisted)
+    beyond = max(tangents[1] - tangents[2], tangents[0] - tangents[1])
+    twist_excess = 2 * beyond if free_twist > 0 and beyond > 2e-5 else 0.0
+    swing_excess = 0.0
+    if value**2 > bound**2 * (1 + 2e-5):
+        swing_excess = 2 * np.linalg.norm(swing) * (1 - bound / value)
     swing = swing * min(1.0, bound / max(value, 1e-12))
     swing = np.where([free_x > 0, free_y > 0], swing, held_swing)
     twist = np.clip(twist, low, high) if free_twist > 0 else held_twist
-    return join(limits, k, swing, twist), broken
+    return join(limits, k, swing, twist), (swing_excess, twist_excess)

@@ -16,6 +16,17 @@ def started(tree, task, share, vector, local):
     return result
 
 
+def last(tree, task, share, previous, start):
+    """Rotations (K, 4) from which joints approach limits: previous ones, less by what is not kept."""
+    result = np.array(previous, float)
+    for k, moved in enumerate((tree.moves != 0).T & (np.array(task) != 0)):
+        own = np.max(np.asarray(share, float)[moved], initial=0) ** 2 if np.any(previous[k]) else 0
+        before = result[k] * (1 if result[k] @ start[k] >= 0 else -1)
+        mixed = own * before + (1 - own) * start[k]
+        result[k] = mixed / np.linalg.norm(mixed)
+    return result
+
+
 def kept(tree, solution, local):
     """Corrections (K, 3) that turn a blended pose into a solution; zero where the tree does not turn."""
     result = np.zeros((len(tree.joint), 3))
