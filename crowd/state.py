@@ -232,6 +232,11 @@ class State:
     """Its angular velocity against that of the target, rad/s. (character, 2, 3)"""
     reach_turn_acceleration: FloatArray = _array(2, 3)
     """rad/s^2. (character, 2, 3)"""
+    reach_turn: FloatArray = _array(2)
+    """How far the hand must turn at its target against the examples, rad. (character, 2)"""
+    reach_turn_before: FloatArray = _array(2, 3)
+    """How the hand was turned against the examples when a rotation came to be asked for on the way, rad.
+    (character, 2, 3)"""
     reach_rotation_share: FloatArray = _array(2)
     """How far the rotation of the goal counts, 0 to 1. (character, 2)"""
     reach_missing_place: FloatArray = _array(2, 3)

@@ -21,6 +21,8 @@ FloatArray = npt.NDArray[np.float64]
 PEOPLE = 1000
 GOING, COMING = 85, 110
 """Frames in which every hand has come to its target, and back to rest."""
+TURNING = 80
+"""Further frames for hands that must turn far, to their targets and back each."""
 TILT = math.radians(20.0)
 """Largest turn of a rotation that is asked for against that of the examples, rad."""
 TWIST = math.radians(140.0)
@@ -183,21 +185,25 @@ def example_acceleration(clips: tuple[Clip, ...], joints: npt.NDArray[np.int32])
 
 
 def run_batch(
-    reachers: Reachers, hand: int, target: FloatArray, rotation: FloatArray | None
+    reachers: Reachers, hand: int, target: FloatArray, rotation: FloatArray | None, further: int = 0
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.uint8], float, float, float]:
-    """Reach for targets and return; gives positions, rotations, statuses, speed, acceleration and jitter."""
+    """Reach for targets and return; gives positions, rotations, statuses, speed, acceleration and jitter.
+
+    Hands have `further` frames for each way.
+    """
+    going = GOING + further
     state, dt = reachers.simulation.state, reachers.simulation.dt
     frames, waiting = [], []
     reachers.reach(hand, target, rotation)
-    for frame in range(GOING + WATCHED):
+    for frame in range(going + WATCHED):
         reachers.step()
         frames.append(reachers.local_rotations())
-        if frame >= GOING:
+        if frame >= going:
             waiting.append(reachers.hand(hand)[0])
     place, turned = reachers.hand(hand)
     status = state.reach_status[:, hand].copy()
     reachers.simulation.reach.end(state, reachers.rows, hand)
-    for _ in range(COMING):
+    for _ in range(COMING + further):
         reachers.step()
         frames.append(reachers.local_rotations())
     speed, acceleration = 0.0, 0.0
@@ -248,10 +254,10 @@ def measure(targets: int, far: int, seed: int = 0) -> list[ReachQuality]:
             first = run_batch(reachers, hand, target, None)
             batches["out of reach"].append((target, None, *first))
             wanted = multiply(from_vector(TWIST * random_turns(people, rng)), first[1])
-            second = run_batch(reachers, hand, target, wanted)
+            second = run_batch(reachers, hand, target, wanted, TURNING)
             batches["both out of reach"].append((target, wanted, *second))
             target = random_targets(reachers, hand, rng, is_far=False)
-            third = run_batch(reachers, hand, target, wanted)
+            third = run_batch(reachers, hand, target, wanted, TURNING)
             batches["rotation out of reach"].append((target, wanted, *third))
         results += [judge(f"{side} hand, {name}", part, most) for name, part in batches.items() if part]
     return results

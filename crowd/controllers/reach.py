@@ -44,6 +44,7 @@ from crowd_kernels.reach_missing import find_missing_crowd
 REACH_LIMITS = ReachLimits(
     least_time=0.25,
     time_per_metre=0.57,
+    time_per_radian=0.7,
     acceleration=12.0,
     target_speed=2.5,
     bulge=0.12,
@@ -241,7 +242,7 @@ class Reach:
             "turn_acceleration",
         ):
             getattr(state, f"reach_{name}")[rows, own] = 0.0
-        for name in ("course", "course_rate", "time_left", "seen_velocity", "bulge"):
+        for name in ("course", "course_rate", "time_left", "seen_velocity", "bulge", "turn", "turn_before"):
             getattr(state, f"reach_{name}")[rows, own] = 0.0
         state.reach_rotation_share[rows, own] = state.reach_has_rotation[rows, own]
         away = state.reach_target_world[rows, own] - state.position_world[rows]
@@ -316,6 +317,7 @@ class Reach:
             self._real,
             self._rows,
             state.reach_correction,
+            state.reach_last_rotation,
             state.pose_rotation,
             state.pose_pelvis,
             self._task,

@@ -43,6 +43,7 @@ from crowd_kernels.reach_goal import (
     course_shares,
     goal_of,
     quaternion_of,
+    set_vector,
     track_target,
     vector_of,
 )
@@ -142,6 +143,7 @@ def aim_hand(
     character: int,
     arm: int,
     other: float,
+    begins: bool,
     scale: Any,
     live_pelvis: Vector,
     live_rotation: Quaternion,
@@ -153,6 +155,7 @@ def aim_hand(
     pose: Any,
     pelvis: Any,
     correction: Any,
+    last: Any,
     out_task: Any,
     out_target: Any,
     out_target_rotation: Any,
@@ -166,6 +169,8 @@ def aim_hand(
     ----------
     other : float
         Share of the other hand's examples.
+    begins : bool
+        A rotation is asked for from now on.
     scale : (G,) float32
         Proportions.
     live_pelvis, live_rotation : tuple of float
@@ -178,6 +183,8 @@ def aim_hand(
         Pelvis at leg scale 1, m.
     correction : (96,) float32
         Last corrections of the character's joints, see `reach_correction`.
+    last : (256,) float32
+        Last solution of inverse kinematics, see `start_solves`.
 
     Notes
     -----
@@ -191,6 +198,8 @@ def aim_hand(
     course = state.course[character, arm]
     side = course if course <= APEX else END - course
     _, risen = course_shares(course, limits.lead)
+    asked = minimum_jerk(state.rotation_share[character, arm])
+    has_rotation = state.has_rotation[character, arm] or asked > 0.0
     kept = kept_share(course, state.course_rate[character, arm] * dt, limits.lead)
     out_kept[character, arm] = kept
     kept *= math.exp(-limits.missing_rate * dt)
@@ -205,13 +214,19 @@ def aim_hand(
         carried = add(carried, rotate(carried_turn, point))
         here = add(here, scaled(subtract(carried, here), left))
         turned = slerp(turned, carried_turn, left)
+    if begins:
+        _, before = place_hand(keys, arm, scale, body, rotation, last, PADDED_JOINTS)
+        turn_before = rotation_vector(multiply(before, conjugate(turned)))
+        set_vector(state.turn_before, character, arm, turn_before)
+    if 0.0 < asked < 1.0:
+        turn_before = scaled(vector_of(state.turn_before, character, arm), 1.0 - asked)
+        turned = multiply(from_rotation_vector(turn_before), turned)
     wanted = quaternion_of(state.rotation, character, arm)
     # Beyond the blends inverse kinematics would find nothing that looks human.
     farthest = limits.farthest + SHARED_TRUNK * other
     nearest = add(here, shortened(subtract(goal, here), farthest))
     target = nearest
     late = 1.0
-    asked = minimum_jerk(state.rotation_share[character, arm])
     out_task[character, arm] = 1
     if course != APEX:
         row[:] = ZERO
@@ -233,12 +248,15 @@ def aim_hand(
         late = minimum_jerk(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * minimum_jerk(min(5.0 * other, 1.0))
         target = add(target, scaled(subtract(nearest, target), late))
         turn = rotation_vector(multiply(wanted, conjugate(apex_turned)))
+        state.turn[character, arm] = norm(turn) if has_rotation else 0.0
         turned = multiply(from_rotation_vector(scaled(turn, risen * asked)), turned)
+    elif has_rotation and state.rotation_share[character, arm] < 1.0:
+        state.turn[character, arm] = norm(rotation_vector(multiply(wanted, conjugate(turned))))
     if asked > 0.0:
         out_task[character, arm] = 3
         turned = slerp(turned, wanted, late * asked)
-        turned = spare_missing_turn(turned, character, arm, kept, state)
-    target = spare_missing_place(target, character, arm, kept, state)
+        turned = spare_missing_turn(turned, character, arm, kept, dt, state)
+    target = spare_missing_place(target, character, arm, kept, dt, state)
     for axis in range(3):
         out_target[character, arm, axis] = target[axis]
     for component in range(4):
@@ -265,6 +283,7 @@ def reach_character(
     real: Any,
     rows: Any,
     correction: Any,
+    last: Any,
     out_task: Any,
     out_target: Any,
     out_target_rotation: Any,
@@ -299,6 +318,8 @@ def reach_character(
         Scratch.
     correction : (96,) float32
         Last corrections of the character's joints, see `reach_correction`.
+    last : (256,) float32
+        Last solution of inverse kinematics, see `start_solves`.
 
     Notes
     -----
@@ -308,11 +329,15 @@ def reach_character(
     total = rows[ROW:]
     live_pelvis, live_rotation = pelvis_of(keys, scale, pose, pelvis)
     own = (0.0, 0.0)
+    begin = (False, False)
     for arm in range(2):
         if state.stage[character, arm] == NONE:
             continue
         if state.stage[character, arm] != RETURN:
+            is_free = state.rotation_share[character, arm] <= 0.0
             track_target(character, arm, position_world, yaw, live_pelvis, size, limits, dt, state)
+            is_asked = is_free and state.rotation_share[character, arm] > 0.0
+            begin = (is_asked, begin[1]) if arm == 0 else (begin[0], is_asked)
         choose_examples(
             character,
             arm,
@@ -339,6 +364,7 @@ def reach_character(
                 character,
                 arm,
                 own[1 - arm],
+                begin[arm],
                 scale,
                 live_pelvis,
                 live_rotation,
@@ -350,6 +376,7 @@ def reach_character(
                 pose,
                 pelvis,
                 correction,
+                last,
                 out_task,
                 out_target,
                 out_target_rotation,
@@ -375,6 +402,7 @@ def reach_crowd(
     real: Any,
     rows: Any,
     correction: Any,
+    last_rotation: Any,
     pose_rotation: Any,
     pose_pelvis: Any,
     out_task: Any,
@@ -416,6 +444,8 @@ def reach_crowd(
         Scratch.
     correction : (N, 96) float32
         Last corrections, see `reach_correction`.
+    last_rotation : (N, 256) float32
+        Last solutions, see `start_solves`.
     pose_rotation : (N, 256) float32
         In and out: pose rows.
     pose_pelvis : (N, 3) float32
@@ -461,6 +491,7 @@ def reach_crowd(
                 real[chunk],
                 rows[chunk],
                 correction[character],
+                last_rotation[character],
                 out_task,
                 out_target,
                 out_target_rotation,

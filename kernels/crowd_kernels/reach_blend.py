@@ -347,7 +347,9 @@ def choose_examples(
     # Long limbs move more slowly (dynamic similarity).
     slowness = math.sqrt(size) / total
     time = state.seconds[character, arm]
-    rate = 1.0 / (there * slowness) if time <= 0.0 else 1.0 / time
+    if time <= 0.0:
+        time = max(there * slowness, limits.time_per_radian * state.turn[character, arm])
+    rate = 1.0 / time
     advance_course(character, arm, rate, rate * there / back, limits, dt, state)
 
 

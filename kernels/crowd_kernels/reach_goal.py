@@ -39,6 +39,8 @@ class ReachLimits(NamedTuple):
     """Shortest time to another target, s."""
     time_per_metre: float
     """Further time by distance, s/m."""
+    time_per_radian: float
+    """Shortest time by how far a hand turns, against the examples or from one target to another, s/rad."""
     acceleration: float
     """A hand that is at its target follows accelerations up to this exactly, m/s^2."""
     target_speed: float
@@ -54,7 +56,7 @@ class ReachLimits(NamedTuple):
     lead: float
     """Share of the way to the apex in which the examples take over the pose."""
     rotation_rate: float
-    """Rate with which a rotation that is asked for on the way comes and goes, 1/s."""
+    """Largest rate with which a rotation that is asked for on the way comes and goes, 1/s."""
     farthest: float
     """Farthest that inverse kinematics takes a hand from where the examples bring it, m."""
     missing_rate: float
@@ -95,6 +97,10 @@ class ReachState(NamedTuple):
     turn_velocity: npt.NDArray[np.float64]
     turn_acceleration: npt.NDArray[np.float64]
     rotation_share: npt.NDArray[np.float64]
+    turn: npt.NDArray[np.float64]
+    """(N, 2) How far hands must turn at the apex against the examples, rad."""
+    turn_before: npt.NDArray[np.float64]
+    """(N, 2, 3) How hands were turned against the examples when a rotation came to be asked for, rad."""
     missing_place: npt.NDArray[np.float64]
     missing_turn: npt.NDArray[np.float64]
     example: npt.NDArray[np.int32]
@@ -314,8 +320,8 @@ def follow_target(
         state.offset[character, arm, axis] = place
         state.offset_velocity[character, arm, axis] = rate_now
         state.offset_acceleration[character, arm, axis] = bend_now
+    state.time_left[character, arm] = left - dt if left > dt else 0.0
     follow_rotation(character, arm, turned, limits, dt, state)
-    state.time_left[character, arm] = max(left - dt, 0.0) if left > dt else 0.0
 
 
 @inlined_kernel
@@ -335,9 +341,14 @@ def follow_rotation(
     state : ReachState
         In and out.
     """
-    # A rotation that only drifts, as of a carried object, is followed within the least time.
-    time = max(state.time_left[character, arm], limits.least_time)
     left = rotation_vector(multiply(quaternion_of(state.rotation, character, arm), conjugate(turned)))
+    # A rotation that only drifts, as of a carried object, is followed within the least time.
+    time = max(limits.time_per_radian * norm(left), limits.least_time)
+    if time > limits.least_time and state.time_left[character, arm] <= 0.0:
+        state.time_left[character, arm] = time
+        state.plan_time[character, arm] = time
+        set_vector(state.bulge, character, arm, (0.0, 0.0, 0.0))
+    time = max(state.time_left[character, arm], time)
     if norm(left) < 1e-4 and norm(vector_of(state.turn_velocity, character, arm)) < 1e-2:
         set_quaternion(state.rotation, character, arm, turned)
         set_vector(state.turn_velocity, character, arm, (0.0, 0.0, 0.0))
@@ -408,10 +419,16 @@ def track_target(
         turned = quaternion_of(state.rotation, character, arm)
     elif state.status[character, arm] == REFUSED:
         state.status[character, arm] = MOVING
-    follow_target(character, arm, target, normalized(turned), limits, dt, state)
     share = state.rotation_share[character, arm]
+    if share <= 0.0:
+        # Nothing shows of the rotation yet, so it need not be sought from an old one.
+        set_quaternion(state.rotation, character, arm, normalized(turned))
+        set_vector(state.turn_velocity, character, arm, (0.0, 0.0, 0.0))
+        set_vector(state.turn_acceleration, character, arm, (0.0, 0.0, 0.0))
+    follow_target(character, arm, target, normalized(turned), limits, dt, state)
     asked = share if is_bad else (1.0 if wants else 0.0)
-    step = limits.rotation_rate * dt
+    time = max(limits.time_per_radian * state.turn[character, arm], 1.0 / limits.rotation_rate)
+    step = dt / time
     state.rotation_share[character, arm] = share + min(max(asked - share, -step), step)
 
 
@@ -470,7 +487,9 @@ def advance_course(
             state.course_rate[character, arm] = 0.0
             state.weight[character, arm] = 0.0
         return
-    is_there = moved == APEX and state.time_left[character, arm] <= 0.0
+    is_turned = not state.has_rotation[character, arm] or state.rotation_share[character, arm] >= 1.0
+    is_turned = is_turned or state.status[character, arm] == REFUSED
+    is_there = moved == APEX and state.time_left[character, arm] <= 0.0 and is_turned
     state.stage[character, arm] = HOLD if is_there else MOVE
 
 

@@ -27,8 +27,8 @@ CHUNKS = 32
 NOTHING = 0
 BOTH = 3
 """Tasks of a hand: nothing, and position with rotation."""
-SLIGHT, SLIGHT_TURN = 0.003, 0.04
-"""What is missing up to these is made up for at once, m and rad."""
+SLIGHT, SLIGHT_TURN = 0.09, 1.2
+"""Much less than these is made up for at once, much more at the given rate; per step, m/s and rad/s."""
 EXACT = np.float32(1e-4)
 """Nothing is missing where inverse kinematics comes this close, m."""
 
@@ -37,11 +37,13 @@ EXACT = np.float32(1e-4)
 def spared_part(missing: Vector, slight: float, kept: float) -> Vector:
     """Find what of a missing vector is spared in the next step."""
     length = norm(missing)
-    return scaled(missing, kept * (1.0 - slight / length) if length > slight else 0.0)
+    return scaled(missing, kept * length / (length + slight))
 
 
 @inlined_kernel
-def spare_missing_place(place: Vector, character: int, arm: int, kept: float, state: ReachState) -> Vector:
+def spare_missing_place(
+    place: Vector, character: int, arm: int, kept: float, dt: float, state: ReachState
+) -> Vector:
     """Take what was missing in the last step from a place that is asked for.
 
     Parameters
@@ -51,6 +53,8 @@ def spare_missing_place(place: Vector, character: int, arm: int, kept: float, st
     character, arm : int
     kept : float
         Share of what was missing that is still spared.
+    dt : float
+        s.
     state : ReachState
         In and out: `missing_place` becomes what is spared.
 
@@ -59,14 +63,14 @@ def spare_missing_place(place: Vector, character: int, arm: int, kept: float, st
     tuple of float
         What inverse kinematics shall be asked for, root frame, m.
     """
-    spared = spared_part(vector_of(state.missing_place, character, arm), SLIGHT, kept)
+    spared = spared_part(vector_of(state.missing_place, character, arm), SLIGHT * dt, kept)
     set_vector(state.missing_place, character, arm, spared)
     return subtract(place, spared)
 
 
 @inlined_kernel
 def spare_missing_turn(
-    rotation: Quaternion, character: int, arm: int, kept: float, state: ReachState
+    rotation: Quaternion, character: int, arm: int, kept: float, dt: float, state: ReachState
 ) -> Quaternion:
     """Take what was missing in the last step from a rotation that is asked for.
 
@@ -77,6 +81,8 @@ def spare_missing_turn(
     character, arm : int
     kept : float
         Share of what was missing that is still spared.
+    dt : float
+        s.
     state : ReachState
         In and out: `missing_turn` becomes what is spared.
 
@@ -85,7 +91,7 @@ def spare_missing_turn(
     tuple of float
         What inverse kinematics shall be asked for, root frame.
     """
-    spared = spared_part(vector_of(state.missing_turn, character, arm), SLIGHT_TURN, kept)
+    spared = spared_part(vector_of(state.missing_turn, character, arm), SLIGHT_TURN * dt, kept)
     set_vector(state.missing_turn, character, arm, spared)
     return multiply(from_rotation_vector(scaled(spared, -1.0)), rotation)
 

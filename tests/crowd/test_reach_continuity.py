@@ -13,7 +13,7 @@ from crowd.bench.reach import (
     random_turns,
 )
 from crowd.motion.rotation import from_vector, multiply
-from crowd_kernels.reach_goal import OUT_OF_REACH, REACHED
+from crowd_kernels.reach_goal import HOLD, MOVING, OUT_OF_REACH, REACHED
 
 PEOPLE = 60
 
@@ -76,7 +76,7 @@ def test_hands_rest_below_rotations_that_they_cannot_have(reachers, hand, is_far
     reachers.simulation.reach.end(state, reachers.rows, hand)
     frames(reachers, 110)
     reachers.reach(hand, target, turned)
-    frames(reachers, 150)
+    frames(reachers, 210)
     places = []
     for _ in range(20):
         reachers.step()
@@ -124,3 +124,62 @@ def test_legs_bend_and_straighten_smoothly_for_what_lies_low(hand, frame_rate, r
     assert np.median(np.ptp(pelvis, axis=0)) > 0.25, "people crouch"
     assert max(leg_motion(rotations, simulation.dt)) < allowed(reachers)
     assert np.abs(np.array(balls) - balls[0])[..., [0, 2]].max() < 1e-6
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+def test_rotations_that_joints_cannot_have_are_sought_and_left_smoothly(reachers, hand, rng):
+    """Joints come to rest softly at their limits, though the blended motion below carries them there."""
+    state = reachers.simulation.state
+    target = random_targets(reachers, hand, rng, is_far=False)
+    turned = multiply(from_vector(2.4 * random_turns(PEOPLE, rng)), reachers.hand(hand)[1])
+    reachers.reach(hand, target, turned)
+    shown = frames(reachers, 130)
+    assert (state.reach_status[:, hand] == OUT_OF_REACH).mean() > 0.3
+    reachers.simulation.reach.end(state, reachers.rows, hand)
+    shown += frames(reachers, 160)
+    assert not state.reach_stage.any()
+    assert angular_motion(np.array(shown), reachers.simulation.dt)[1] < allowed(reachers)
+
+
+def test_a_held_target_that_turns_is_followed_in_human_time(reachers, rng):
+    simulation = reachers.simulation
+    state = simulation.state
+    target = before_the_body(reachers, 0, rng)
+    reachers.reach(0, target)
+    frames(reachers, 85)
+    first = reachers.hand(0)[1]
+    shown = frames(reachers, 1)
+    turn = random_turns(PEOPLE, rng)
+    reachers.reach(0, target, multiply(from_vector(turn), first))
+    shown += frames(reachers, 10)
+    assert (state.reach_status[:, 0] == MOVING).all()
+    shown += frames(reachers, 80)
+    assert (state.reach_status[:, 0] == REACHED).mean() > 0.5
+    reachers.reach(0, target, multiply(from_vector(-turn), first))
+    shown += frames(reachers, 10)
+    assert (state.reach_status[:, 0] == MOVING).all()
+    shown += frames(reachers, 80)
+    assert (state.reach_status[:, 0] == REACHED).mean() > 0.5
+    assert angular_motion(np.array(shown), simulation.dt)[1] < allowed(reachers)
+
+
+def test_hands_that_must_turn_far_take_their_time(reachers, rng):
+    state, dt = reachers.simulation.state, reachers.simulation.dt
+    per_radian = reachers.simulation.reach.settings.limits.time_per_radian
+    target = before_the_body(reachers, 0, rng)
+    reachers.reach(0, target)
+    frames(reachers, 85)
+    natural = reachers.hand(0)[1]
+    reachers.simulation.reach.end(state, reachers.rows, 0)
+    frames(reachers, 110)
+    angle = rng.uniform(0.0, 2.4, (PEOPLE, 1))
+    reachers.reach(0, target, multiply(from_vector(angle * random_turns(PEOPLE, rng)), natural))
+    arrived = np.zeros(PEOPLE)
+    for frame in range(120):
+        reachers.step()
+        arrived[(state.reach_stage[:, 0] == HOLD) & (arrived == 0)] = (frame + 1) * dt
+    least = per_radian * angle[:, 0]
+    # The turn against the examples is a little more or less than that against the natural pose.
+    assert (arrived > least - 0.3).all()
+    # Small turns cost nothing.
+    assert arrived[least < 0.5].max() < 1.1

@@ -100,8 +100,8 @@ def test_reach_matches_oracle(reachers, hand, course, rng):
         space.arrays, keys, REACH_LIMITS, simulation.model.people.segment_scale, reachers.size,
         state.position_world, state.yaw, state.is_seated, np.zeros(24), reachers.rows, 1e-5,
         ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields)),
-        reach._number, reach._real, reach._rows, state.reach_correction, pose, pelvis,
-        task, out, np.zeros((24, 2, 4), np.float32), np.zeros((24, 2), np.float32),
+        reach._number, reach._real, reach._rows, state.reach_correction, state.reach_last_rotation,
+        pose, pelvis, task, out, np.zeros((24, 2, 4), np.float32), np.zeros((24, 2), np.float32),
     )  # fmt: skip
     first = [0, len(space.examples[0].clips)][hand]
     for row in range(24):
