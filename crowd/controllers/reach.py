@@ -64,7 +64,7 @@ SOLVE = SETTINGS._replace(
     turn_error_damping=6.0,
     pull_fade=1.0,
     place_first=0,
-    passes=8,
+    passes=8,  # Arms at many limits at once, far from rotations they cannot have, sway with fewer.
 )
 EFFECTORS = ("right_hand", "left_hand")
 FEWEST_EXAMPLES = 8
@@ -225,7 +225,9 @@ class Reach:
             self._look_for_walls(state, characters, hands)
         is_good = np.isfinite(state.reach_target_world[characters, hands]).all(axis=1)
         is_good &= ~state.reach_is_blocked[characters, hands]
+        # Another start before the first step begins anew as well.
         is_new = state.reach_stage[characters, hands] == NONE
+        is_new |= state.reach_course[characters, hands] == 0.0
         rests = (state.reach_stage[characters] == NONE).all(axis=1)
         state.reach_correction[characters[rests]] = 0.0
         state.reach_last_rotation[characters[rests]] = 0.0

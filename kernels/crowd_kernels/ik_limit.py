@@ -39,8 +39,9 @@ FREE_SHARE: Any = np.float32(0.1)
 """Share of a direction that must be left to be fixed. Beside the end of a curved limit another direction, at
 a small angle to the first, would be fixed as well, and the joint would not slide along the limit."""
 SLACK: Any = np.float32(2e-5)
+"""What rounding may leave of an excess: share of the swing ellipse's value, and of half the twist in rad."""
 GRAVE: Any = np.float32(0.3)
-"""Share of the largest excess from which directions are fixed."""
+"""Share of the largest excess from which directions are fixed: lesser ones often come back by themselves."""
 
 
 @inlined_kernel
@@ -214,7 +215,7 @@ def find_limit_row(
     Returns
     -------
     bool
-        Someone's joint would leave its limits.
+        Someone's joint would leave its room.
     """
     is_outside = False
     for lane in range(LANES):
@@ -270,7 +271,7 @@ def limit_row(
     row: Any,
     out_violations: Any,
 ) -> None:
-    """Bring a joint's next rotation into its limits, and fix the directions that would have left them.
+    """Bring a joint's next rotation into its room, and fix the gravest of the directions that would leave it.
 
     Parameters
     ----------

@@ -250,7 +250,9 @@ def aim_hand(
         turn = rotation_vector(multiply(wanted, conjugate(apex_turned)))
         state.turn[character, arm] = norm(turn) if has_rotation else 0.0
         turned = multiply(from_rotation_vector(scaled(turn, risen * asked)), turned)
-    elif has_rotation and state.rotation_share[character, arm] < 1.0:
+    elif not has_rotation:
+        state.turn[character, arm] = 0.0
+    elif state.rotation_share[character, arm] < 1.0:
         state.turn[character, arm] = norm(rotation_vector(multiply(wanted, conjugate(turned))))
     if asked > 0.0:
         out_task[character, arm] = 3

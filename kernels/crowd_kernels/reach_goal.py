@@ -30,6 +30,9 @@ NONE, MOVE, HOLD, RETURN = 0, 1, 2, 3
 MOVING, REACHED, OUT_OF_REACH, REFUSED = 1, 2, 3, 4
 """Statuses, as those of inverse kinematics."""
 APEX, END = 1.0, 2.0
+JUMPED = 0.8
+"""A rotation asked for that is farther away than this has jumped, and the hand is on its way again; one that
+turns at up to 4 rad/s is followed closer, rad."""
 
 
 class ReachLimits(NamedTuple):
@@ -52,7 +55,7 @@ class ReachLimits(NamedTuple):
     body_radius: float
     """Targets closer to the spine than this are refused, m at the library's size."""
     turn_back: float
-    """Change of the course's rate when a reach turns back, over the square of its rate."""
+    """Change of the course's rate when a reach turns back or slows down, over the square of that rate."""
     lead: float
     """Share of the way to the apex in which the examples take over the pose."""
     rotation_rate: float
@@ -344,7 +347,7 @@ def follow_rotation(
     left = rotation_vector(multiply(quaternion_of(state.rotation, character, arm), conjugate(turned)))
     # A rotation that only drifts, as of a carried object, is followed within the least time.
     time = max(limits.time_per_radian * norm(left), limits.least_time)
-    if time > limits.least_time and state.time_left[character, arm] <= 0.0:
+    if norm(left) > JUMPED and state.time_left[character, arm] <= 0.0:
         state.time_left[character, arm] = time
         state.plan_time[character, arm] = time
         set_vector(state.bulge, character, arm, (0.0, 0.0, 0.0))
@@ -470,7 +473,8 @@ def advance_course(
     if course in (0.0, APEX):
         now = wanted
     else:
-        change = limits.turn_back * rate * rate * dt
+        fastest = max(rate, abs(now))
+        change = limits.turn_back * fastest * fastest * dt
         now += min(max(wanted - now, -change), change)
     moved = course + now * dt
     # Courses stop at the apex, whose pose all sections share.
