@@ -86,7 +86,7 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     if (outcome := _with_own(tasks, row, items)) is not Outcome.FAIL:
         return outcome
     is_free = (objects.holder[items] < 0) & ((tasks.claimed_by[items] < 0) | (tasks.claimed_by[items] == row))
-    if tasks.names.is_family(group):
+    if tasks.names.groups[group].is_kind:
         is_left = ~tasks.is_delivered[items]
         if not is_left.any():
             return Outcome.NOTHING_LEFT
@@ -134,7 +134,7 @@ def _with_own(tasks: Tasks, row: int, items: npt.NDArray[np.intp]) -> Outcome:
 
 def _that_are_somewhere(tasks: Tasks, group: int) -> npt.NDArray[np.intp]:
     """Objects of a name, without those whose position is not finite."""
-    items = np.array(tasks.names.groups[group], np.intp)
+    items = np.array(tasks.names.groups[group].rows, np.intp)
     return items[np.isfinite(tasks.simulation.objects.position_world[items]).all(axis=1)]
 
 
@@ -181,7 +181,7 @@ def _are_in_others(tasks: Tasks, item: int, places_world: FloatArray) -> BoolArr
 
 
 def _nearest_furniture(tasks: Tasks, row: int, group: int) -> Furniture:
-    pieces = [tasks.simulation.model.furniture[index] for index in tasks.names.groups[group]]
+    pieces = [tasks.simulation.model.furniture[index] for index in tasks.names.groups[group].rows]
     here = tasks.simulation.state.position_world[row]
     return min(pieces, key=lambda piece: float(np.linalg.norm(piece.center - here)))
 
@@ -195,7 +195,7 @@ def _nearest(tasks: Tasks, row: int, points_world: FloatArray) -> npt.NDArray[np
 def _free_spots(tasks: Tasks, row: int, group: int) -> FloatArray:
     """Free places on the furniture of a name, the nearest to the person first, at most ten. (P, 3)"""
     simulation = tasks.simulation
-    spots = np.concatenate([simulation.model.furniture[i].spots() for i in tasks.names.groups[group]])
+    spots = np.concatenate([simulation.model.furniture[i].spots() for i in tasks.names.groups[group].rows])
     objects = simulation.objects
     used = [objects.position_world[objects.holder < 0]]
     putting = (
@@ -223,7 +223,7 @@ def choose_seat(tasks: Tasks, row: int, time: float) -> Outcome:
     radius = float(simulation.model.radius[row])
     here = simulation.state.position_world[row]
     found = []
-    for index in tasks.names.groups[group]:
+    for index in tasks.names.groups[group].rows:
         place, yaw = simulation.model.furniture[index].sitting_place(radius + SEAT_CLEARANCE)
         if simulation.model.world.is_walkable(place[None], radius)[0] and not _is_place_taken(
             tasks, row, place

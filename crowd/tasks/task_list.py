@@ -69,15 +69,37 @@ FIRST_LENGTH = 8
 """Room for tasks of each person when the scenario gives shorter lists; programs may add longer ones."""
 
 
-def families(names: Sequence[str]) -> dict[str, tuple[int, ...]]:
-    """Rows of each name, and of each name without numbers at its end: ``cup_2[3]``, ``cup_2`` and ``cup``."""
-    found: dict[str, list[int]] = {}
+@dataclass(frozen=True, order=True)
+class Group:
+    """What one name stands for.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        Of objects or of furniture.
+    is_kind : bool
+        It is the name of a kind, of which there may be one thing only; otherwise a thing's full name.
+    """
+
+    rows: tuple[int, ...]
+    is_kind: bool
+
+
+def groups_of(names: Sequence[str]) -> dict[str, Group]:
+    """What each full name stands for, and each one without numbers at its end: ``cup_2`` and ``cup``.
+
+    The full name of a thing means this thing only, also where others are called so with a number.
+    """
+    things: dict[str, list[int]] = {}
+    kinds: dict[str, list[int]] = {}
     for row, name in enumerate(names):
-        found.setdefault(name, []).append(row)
-        while (family := re.sub(r"(_\d+|\[\d+\])$", "", name)) != name:
-            found.setdefault(family, []).append(row)
-            name = family
-    return {name: tuple(rows) for name, rows in found.items()}
+        things.setdefault(name, []).append(row)
+        while (kind := re.sub(r"(_\d+|\[\d+\])$", "", name)) != name:
+            kinds.setdefault(kind, []).append(row)
+            name = kind
+    return {name: Group(tuple(rows), True) for name, rows in kinds.items()} | {
+        name: Group(tuple(rows), False) for name, rows in things.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -86,15 +108,14 @@ class TaskNames:
 
     Attributes
     ----------
-    groups : tuple of tuple of int
-        Rows of objects or of furniture that one name stands for.
+    groups : tuple of Group
     objects, furniture, seats : dict of str to int
-        Index in `groups`; with families of names.
+        Index in `groups`; of full names and of kinds.
     characters, clips : dict of str to int
         Row of the character, or of the clip table.
     """
 
-    groups: tuple[tuple[int, ...], ...]
+    groups: tuple[Group, ...]
     objects: Mapping[str, int]
     furniture: Mapping[str, int]
     seats: Mapping[str, int]
@@ -110,26 +131,23 @@ class TaskNames:
         clips: Mapping[str, int],
     ) -> "TaskNames":
         """Collect the names of a scene."""
-        named = families(objects.name)
-        pieces = families([piece.name for piece in furniture])
+        named = groups_of(objects.name)
+        pieces = groups_of([piece.name for piece in furniture])
         seats = {
-            name: tuple(row for row in rows if furniture[row].facing is not None)
-            for name, rows in pieces.items()
+            name: Group(seat_rows, piece.is_kind)
+            for name, piece in pieces.items()
+            if (seat_rows := tuple(row for row in piece.rows if furniture[row].facing is not None))
         }
-        groups = tuple(sorted({*named.values(), *pieces.values(), *seats.values()} - {()}))
-        index = {rows: number for number, rows in enumerate(groups)}
+        groups = tuple(sorted({*named.values(), *pieces.values(), *seats.values()}))
+        index = {group: number for number, group in enumerate(groups)}
         return cls(
             groups,
-            {name: index[rows] for name, rows in named.items()},
-            {name: index[rows] for name, rows in pieces.items()},
-            {name: index[rows] for name, rows in seats.items() if rows},
+            {name: index[group] for name, group in named.items()},
+            {name: index[group] for name, group in pieces.items()},
+            {name: index[group] for name, group in seats.items()},
             {name: row for row, name in enumerate(placed.name)},
             clips,
         )
-
-    def is_family(self, group: int) -> bool:
-        """Whether a name stands for several things: any of a kind."""
-        return len(self.groups[group]) > 1
 
     def choices(self, action: str) -> tuple[tuple[Target, Mapping[str, int]], ...]:
         """What the name in a task with this action may stand for."""

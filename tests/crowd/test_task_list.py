@@ -5,7 +5,7 @@ import pytest
 import crowd
 from crowd.errors import ScenarioError, SettingsError
 from crowd.scenario.task_table import ACTIONS
-from crowd.tasks.task_list import TaskKind, families
+from crowd.tasks.task_list import Group, TaskKind, groups_of
 
 SCENE = """
 [world]
@@ -32,14 +32,18 @@ def load(folder, tasks):
     return crowd.Simulation(crowd.load_scenario(path), threads=1)
 
 
-def test_names_stand_for_their_families():
-    assert families(("cup_1", "cup_2[0]", "mug")) == {
-        "cup_1": (0,),
-        "cup": (0, 1),
-        "cup_2[0]": (1,),
-        "cup_2": (1,),
-        "mug": (2,),
+def test_names_stand_for_things_and_kinds():
+    assert groups_of(("cup_1", "cup_2[0]", "mug")) == {
+        "cup_1": Group((0,), is_kind=False),
+        "cup": Group((0, 1), is_kind=True),
+        "cup_2[0]": Group((1,), is_kind=False),
+        "cup_2": Group((1,), is_kind=True),
+        "mug": Group((2,), is_kind=False),
     }
+
+
+def test_a_full_name_means_one_thing_also_where_others_have_it_with_a_number():
+    assert groups_of(("mug", "mug_1", "mug_2"))["mug"] == Group((0,), is_kind=False)
 
 
 @pytest.mark.parametrize(

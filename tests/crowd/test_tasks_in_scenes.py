@@ -133,6 +133,20 @@ def test_nobody_waits_for_a_kind_of_which_all_are_put_down(tmp_path):
     assert last.time - before.time < 0.2
 
 
+def test_a_kind_of_which_there_is_one_thing_is_no_name_of_its_own(tmp_path):
+    mug = '[[objects]]\nname = "mug_1"\nshape = "sphere"\nradius = 0.04\nposition = [0.4, 1.14, -2.8]\n\n'
+    tasks = '{ pick_up = "mug" }, { put_down = "table" }, { pick_up = "mug" }, { pick_up = "mug_1" }'
+    path = tmp_path / "room.toml"
+    others = ROOM[ROOM.index("[[objects]]") : ROOM.index("{people}")]
+    path.write_text(ROOM.replace(others, mug).format(people=person("ann", 0.0, 0.0, tasks)), encoding="utf-8")
+    simulation = crowd.Simulation(crowd.load_scenario(path), threads=1)
+    finish(simulation, 60.0)
+    assert done(simulation) == ["pick_up", "put_down", "pick_up"]
+    failed = [event.detail for event in simulation.events if event.kind is EventKind.TASK_FAILED]
+    assert failed == ["all of the kind have been put down already"]
+    assert simulation.objects.holder.tolist() == [0]
+
+
 def test_of_two_things_the_named_hand_puts_its_own_down(tmp_path):
     tasks = (
         '{ pick_up = "can_1", hand = "right" }, { pick_up = "can_2", hand = "left" }, '
