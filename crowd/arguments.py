@@ -1,13 +1,21 @@
 """Numbers, vectors, rotations, times and seeds that programs give, checked."""
 
-import math
 import operator
-from typing import SupportsFloat, SupportsIndex
+from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
 
 from crowd.errors import SettingsError, describe
+
+LONGEST = 86_400.0
+"""Longest run, s: a day is more than any crowd needs, and a slip of units asks for more."""
+LARGEST_SEED = 2**63 - 1
+"""What the whole numbers of 64 bits hold with which random numbers are made."""
+SHOWN_BITS = 128
+"""Longest whole number that messages show; Python writes no number of more than 4,300 digits at all."""
+REAL_KINDS = "iufO"
+"""Kinds of NumPy types that are real numbers, or objects that may be; no truth values, text, complex ones."""
 
 
 def number(what: str, name: str, value: SupportsFloat, allowed: str) -> float:
@@ -18,21 +26,24 @@ def number(what: str, name: str, value: SupportsFloat, allowed: str) -> float:
     what, name : str
         Command and argument, for messages.
     value : number
-        Text is refused, also such as looks like a number.
+        Text is refused, also such as looks like a number; so are truth values and complex numbers.
     allowed : str
         The range, for messages.
 
     Raises
     ------
     SettingsError
-        It is no number.
+        It is no number, or is too large for one.
     """
     try:
-        if isinstance(value, str | bytes):
+        array = np.asarray(value)
+        if array.ndim or array.dtype.kind not in REAL_KINDS:
             raise TypeError
         return float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise SettingsError(describe(what, f"{name} is not a number", str(value), allowed)) from None
+    except (TypeError, ValueError):
+        raise SettingsError(describe(what, f"{name} is not a number", shown(value), allowed)) from None
+    except OverflowError:
+        raise SettingsError(describe(what, f"{name} is too large", shown(value), allowed)) from None
 
 
 def vectors(
@@ -69,9 +80,14 @@ def vectors(
     """
     allowed = " or ".join(f"({length},) or ({count}, {length})" for length in lengths)
     try:
-        array = np.asarray(value, np.float64)
+        given = np.asarray(value)
+        if given.dtype.kind not in REAL_KINDS:
+            raise TypeError
+        array = given.astype(np.float64)
     except (TypeError, ValueError):
-        raise SettingsError(describe(what, f"{name} is not numbers", str(value), allowed)) from None
+        raise SettingsError(describe(what, f"{name} is not numbers", shown(value), allowed)) from None
+    except OverflowError:
+        raise SettingsError(describe(what, f"{name} is too large", allowed="numbers up to 1e308")) from None
     if array.shape not in [shape for length in lengths for shape in ((length,), (count, length))]:
         raise SettingsError(describe(what, f"{name} has the wrong shape", array.shape, allowed))
     if must_be_finite and not np.isfinite(array).all():
@@ -94,11 +110,6 @@ def rotations_of(what: str, value: npt.ArrayLike, count: int) -> npt.NDArray[np.
     return np.asarray(quaternion / length)
 
 
-LONGEST = 86_400.0
-"""Longest run, s."""
-LARGEST_SEED = 2**63 - 1
-
-
 def checked_seed(value: SupportsIndex) -> int:
     """Read the key of random choices.
 
@@ -107,25 +118,54 @@ def checked_seed(value: SupportsIndex) -> int:
     SettingsError
         It is no whole number of 64 bits.
     """
+    return whole_number("seed", value, -LARGEST_SEED - 1, LARGEST_SEED)
+
+
+def whole_number(what: str, value: SupportsIndex, least: int, most: int) -> int:
+    """Read a whole number from a range.
+
+    Parameters
+    ----------
+    what : str
+        Argument, for messages.
+    value : int
+        Truth values are refused.
+    least, most : int
+
+    Raises
+    ------
+    SettingsError
+        It is no whole number, or outside the range.
+    """
     try:
-        seed = operator.index(value)
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
+        whole = operator.index(value)
     except TypeError:
-        raise SettingsError(describe("seed", "is no whole number", str(value), "a whole number")) from None
-    if not -LARGEST_SEED - 1 <= seed <= LARGEST_SEED:
-        raise SettingsError(
-            describe("seed", "is out of range", seed, f"{-LARGEST_SEED - 1} to {LARGEST_SEED}")
-        )
-    return seed
+        raise SettingsError(describe(what, "is no whole number", shown(value), "a whole number")) from None
+    if not least <= whole <= most:
+        got = whole if whole.bit_length() <= SHOWN_BITS else shown(whole)
+        raise SettingsError(describe(what, "is out of range", got, f"{least} to {most}"))
+    return whole
 
 
-def require_seconds(what: str, seconds: float) -> None:
-    """Refuse a length of time that cannot be simulated.
+def shown(value: Any) -> str:
+    """What somebody gave, in one line; of a very long number only how long it is."""
+    if isinstance(value, int) and value.bit_length() > SHOWN_BITS:
+        return f"a whole number of {value.bit_length()} bits"
+    return " ".join(str(value).split())
+
+
+def checked_seconds(what: str, seconds: SupportsFloat) -> float:
+    """Read a length of time to simulate, s.
 
     Raises
     ------
     SettingsError
         It is no number, below 0, or longer than a day.
     """
-    is_number = isinstance(seconds, int | float | np.number) and math.isfinite(seconds)
-    if not is_number or not 0.0 <= seconds <= LONGEST:
-        raise SettingsError(describe(what, "seconds are out of range", seconds, f"0 to {LONGEST:g} s"))
+    allowed = f"0 to {LONGEST:g} s"
+    length = number(what, "seconds", seconds, allowed)
+    if not 0.0 <= length <= LONGEST:
+        raise SettingsError(describe(what, "seconds are out of range", length, allowed))
+    return length

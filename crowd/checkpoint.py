@@ -21,10 +21,15 @@ from crowd.errors import RecordingError, describe
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
-FORMAT = 1
+FORMAT = 2
+"""Counts up when the meaning of arrays changes; other names of arrays tell by themselves."""
 BEGIN = b"PK\x03\x04"
 """How a file begins that `save` has written: it is an archive of arrays."""
 SHOWN_BYTES = 8
+"""How much of a file that is something else is shown: enough to know its kind."""
+SHOWN_NAMES = 3
+"""How many arrays that are too many or too few are named."""
+OTHER_VERSION = "is of another version of the engine"
 ALLOWED = "a file written by Simulation.save"
 
 
@@ -84,11 +89,14 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     RecordingError
-        The file is no checkpoint, or belongs to another run; the simulation is as it was.
+        The file is no checkpoint, or belongs to another run or another version of the engine; the simulation
+        is as it was.
     """
     facts, contents = _read(Path(path))
+    if facts.get("format") != FORMAT:
+        what = f"{OTHER_VERSION}: its format is another"
+        raise RecordingError(describe(str(path), what, facts.get("format"), str(FORMAT)))
     expected = {
-        "format": FORMAT,
         "scenario": simulation.scenario.name,
         "capacity": simulation.model.capacity,
         "seed": simulation.seed,
@@ -99,14 +107,21 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> None:
             raise RecordingError(
                 describe(str(path), f"checkpoint of another run: {key}", facts.get(key), repr(value))
             )
-    for name, array in state_arrays(simulation):
-        stored_array = contents.get(name)
-        if stored_array is None or (stored_array.shape, stored_array.dtype) != (array.shape, array.dtype):
-            got = None if stored_array is None else f"{stored_array.dtype} {stored_array.shape}"
+    arrays = dict(state_arrays(simulation))
+    if contents.keys() != arrays.keys():
+        others = [f"no {name}" for name in arrays.keys() - contents.keys()]
+        others += contents.keys() - arrays.keys()
+        got = ", ".join(sorted(others)[:SHOWN_NAMES])
+        what = f"{OTHER_VERSION}: its arrays are others"
+        raise RecordingError(describe(str(path), what, got, "those of this version"))
+    for name, array in arrays.items():
+        stored = contents[name]
+        if (stored.shape, stored.dtype) != (array.shape, array.dtype):
+            got = f"{stored.dtype} {stored.shape}"
             raise RecordingError(
-                describe(str(path), f"checkpoint lacks {name}", got, f"{array.dtype} {array.shape}")
+                describe(str(path), f"does not fit the scenario: {name}", got, f"{array.dtype} {array.shape}")
             )
-    for name, array in state_arrays(simulation):
+    for name, array in arrays.items():
         array[...] = contents[name]
     simulation.step_index = int(facts["step_index"])
     simulation.model.timetable.update(simulation.model.world, simulation.time)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from crowd.arguments import number, rotations_of, vectors
+from crowd.arguments import number, rotations_of, shown, vectors
 from crowd.controllers.carrying import FREE
 from crowd.controllers.grab import CLOSING, HOLDING, GrabStatus
 from crowd.errors import SettingsError, describe
@@ -519,7 +519,7 @@ class Commands:
             rows = np.flatnonzero(rows)
         if rows.size and not np.issubdtype(rows.dtype, np.integer):
             allowed = f"whole numbers, 0 to {capacity - 1}"
-            raise SettingsError(describe("characters", "are no rows", str(characters), allowed))
+            raise SettingsError(describe("characters", "are no rows", shown(characters), allowed))
         if rows.size and (rows.min() < 0 or rows.max() >= capacity):
             wrong = int(rows[(rows < 0) | (rows >= capacity)][0])
             raise SettingsError(describe("characters", "no such row", wrong, f"0 to {capacity - 1}"))

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from crowd import checkpoint
-from crowd.arguments import checked_seed, require_seconds
+from crowd.arguments import checked_seconds, checked_seed, whole_number
 from crowd.checkpoint import Stateful
 from crowd.commands import Commands
 from crowd.controllers.animation import Animation
@@ -41,6 +41,8 @@ from crowd_kernels import _jit
 
 BODIES = ("people", "discs")
 SERIAL_BELOW = 200
+MOST_CHARACTERS = 2**31 - 1
+"""What rows of 32 bits can tell apart."""
 STAGES = ("perceive", "decide", "navigate", "steer", "locomote", "animate", "settle", "record")
 
 
@@ -107,6 +109,8 @@ class Simulation:
         self.bodies = bodies
         self.dt = scenario.dt
         self.step_index = 0
+        if characters is not None:
+            characters = whole_number("characters", characters, 1, MOST_CHARACTERS)
         self.model = Model.build(
             scenario, seed, motions, characters, [Path(file) for file in character_files]
         )
@@ -209,9 +213,9 @@ class Simulation:
         SettingsError
             It is no time, or too long.
         """
+        last = None
         if seconds is not None:
-            require_seconds("run", seconds)
-        last = None if seconds is None else self.step_index + round(seconds / self.dt)
+            last = self.step_index + round(checked_seconds("run", seconds) / self.dt)
         while not self.is_finished if last is None else self.step_index < last:
             yield self.step()
 
@@ -343,6 +347,4 @@ def thread_count(wanted: int | None) -> int:
     most = _jit.maximum_thread_count()
     if wanted is None:
         return most
-    if not 1 <= wanted <= most:
-        raise SettingsError(describe("threads", "is out of range", wanted, f"1 to {most}"))
-    return wanted
+    return whole_number("threads", wanted, 1, most)

@@ -1,5 +1,6 @@
 """Whole runs: repeatable bits, stop and go on, people who get where they should, obstacles that go."""
 
+import json
 import pickle
 
 import numpy as np
@@ -102,6 +103,12 @@ def changed_checkpoint(path, **changes):
     np.savez(path, **{name: array for name, array in contents.items() if array is not None})
 
 
+def facts_with(path, **changes):
+    """The facts of a checkpoint, with others."""
+    with np.load(path) as stored:
+        return np.array(json.dumps(json.loads(str(stored["facts"])) | changes))
+
+
 def single_array(path):
     """Write one array, as NumPy does outside archives."""
     with path.open("wb") as file:
@@ -154,12 +161,16 @@ def test_a_checkpoint_that_does_not_fit_changes_nothing(tmp_path):
     whole = (tmp_path / "stop.npz").read_bytes()
     (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
     changed_checkpoint(tmp_path / "lacks.npz", **{"state.yaw": None})
+    changed_checkpoint(tmp_path / "more.npz", **{"state.wings": np.zeros(3)})
+    changed_checkpoint(tmp_path / "old.npz", facts=facts_with(tmp_path / "stop.npz", format=1))
     changed_checkpoint(tmp_path / "text.npz", **{"state.yaw": np.full(simulation.state.yaw.shape, "left")})
     before = arrays_of(simulation)
     for name, message in (
         ("cut", f"is cut off; got '{len(whole) // 2} bytes'; allowed the whole file"),
-        ("lacks", "checkpoint lacks state.yaw; allowed float64 "),
-        ("text", "checkpoint lacks state.yaw; got '<U4 "),
+        ("lacks", "is of another version of the engine: its arrays are others; got 'no state.yaw'; allowed "),
+        ("more", "is of another version of the engine: its arrays are others; got 'state.wings'; allowed "),
+        ("text", "does not fit the scenario: state.yaw; got '<U4 "),
+        ("old", "is of another version of the engine: its format is another; got 1; allowed 2"),
     ):
         with pytest.raises(RecordingError) as caught:
             simulation.restore(tmp_path / f"{name}.npz")
@@ -309,8 +320,14 @@ def test_bad_commands_get_one_clear_line(call, error, message):
         ),
         ({"seed": "a"}, "seed: is no whole number; got 'a'; allowed a whole number"),
         ({"seed": 1.5}, "seed: is no whole number; got '1.5'"),
+        ({"seed": True}, "seed: is no whole number; got 'True'"),
+        ({"seed": 10**5000}, "seed: is out of range; got 'a whole number of 16610 bits'; allowed -92233"),
         ({"bodies": "disks"}, 'bodies: is unknown; got \'disks\'; allowed "discs", "people"'),
         ({"threads": 0}, "threads: is out of range; got 0; allowed 1 to"),
+        ({"threads": 1.5}, "threads: is no whole number; got '1.5'; allowed a whole number"),
+        ({"threads": "2"}, "threads: is no whole number; got '2'"),
+        ({"characters": 2.5}, "characters: is no whole number; got '2.5'"),
+        ({"characters": 10**400}, "characters: is out of range; got 'a whole number of 1329 bits'"),
         (
             {"scenario": "plaza"},
             "scenario: is no scenario; got \"'plaza'\"; allowed what crowd.load_scenario",
@@ -325,15 +342,38 @@ def test_wrong_arguments_of_a_simulation_are_one_line(how, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), -1.0, 1e9, "1", None])
-def test_a_length_that_cannot_be_run_is_refused(seconds):
+@pytest.mark.parametrize(
+    ("seconds", "what"),
+    [
+        (float("nan"), "seconds are out of range; got nan"),
+        (float("inf"), "seconds are out of range; got inf"),
+        (-1.0, "seconds are out of range; got -1.0"),
+        (1e9, "seconds are out of range; got 1000000000.0"),
+        (10**400, "seconds is too large; got 'a whole number of 1329 bits'"),
+        pytest.param(10**5000, "seconds is too large; got 'a whole number of 16610 bits'", id="unwritable"),
+        ("1", "seconds is not a number; got '1'"),
+        (True, "seconds is not a number; got 'True'"),
+        (np.True_, "seconds is not a number; got 'True'"),
+        (1j, "seconds is not a number; got '1j'"),
+        (np.complex128(1), "seconds is not a number; got '(1+0j)'"),
+        ([1.0], "seconds is not a number; got '[1.0]'"),
+        (np.ones((2, 2)), "seconds is not a number; got '[[1. 1.] [1. 1.]]'"),
+    ],
+)
+def test_a_length_that_cannot_be_run_is_refused(seconds, what):
     simulation = crowd.Simulation(Scenario(world=GROUND, characters=(walker(),)))
-    if seconds is None:
-        assert not list(simulation.run(seconds=0.0))
-        return
-    with pytest.raises(SettingsError, match=r"run: seconds are out of range; got .*; allowed 0 to 86400 s"):
+    with pytest.raises(SettingsError) as caught:
         next(simulation.run(seconds=seconds))
+    assert str(caught.value).startswith(f"run: {what}")
+    assert str(caught.value).endswith("; allowed 0 to 86400 s")
+    assert len(str(caught.value).splitlines()) == 1
     assert simulation.time == 0.0
+
+
+@pytest.mark.parametrize("seconds", [0, 0.0, np.float32(0.0), np.array(0.0)])
+def test_a_run_of_no_length_has_no_step(seconds):
+    simulation = crowd.Simulation(Scenario(world=GROUND, characters=(walker(),)))
+    assert not list(simulation.run(seconds=seconds))
 
 
 def test_joints_hang_together_and_rotations_are_unit():

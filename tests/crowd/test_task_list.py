@@ -1,5 +1,6 @@
 """Task lists are checked with file, line and key, and names stand for one thing or for all of a kind."""
 
+import numpy as np
 import pytest
 
 import crowd
@@ -213,6 +214,11 @@ def test_whoever_waits_is_told_when_the_other_gives_up(tmp_path):
         (lambda do: do.set_locomotion(0, (1.0, 0.0)), "set_locomotion: parameter vector has the wrong shape"),
         (lambda do: do.set_locomotion(0, "fast"), "set_locomotion: parameter vector is not numbers"),
         (lambda do: do.look_at(0, "ann"), "look_at: point is not numbers"),
+        (lambda do: do.look_at(0, ["1", "2", "3"]), "look_at: point is not numbers"),
+        (lambda do: do.put(0, np.full((1, 3), 1j)), "put: position is not numbers"),
+        (lambda do: do.put(0, (True, False, True)), "put: position is not numbers"),
+        (lambda do: do.put(0, (10**400, 0, 0)), "put: position is too large; allowed numbers up to 1e308"),
+        (lambda do: do.put(10**5000, (1, 1, 1)), "characters: are no rows; got 'a whole number of 16610 b"),
         (lambda do: do.look_at(0, character=[0, 0]), "look_at: wrong number of characters to look at; got 2"),
         (lambda do: do.look_at(0, object=0.5), "look_at: no such object; got 0.5"),
         (lambda do: do.look_at(0, object="cap"), "no object has this name; got 'cap'; allowed \"cup_1\""),
@@ -239,6 +245,9 @@ def test_whoever_waits_is_told_when_the_other_gives_up(tmp_path):
             "look_at: trunk is not a number; got 'half'; allowed 0 to 1",
         ),
         (lambda do: do.look_at(0, (1, 1, 1), trunk=[0.5, 0.5]), "look_at: trunk is not a number"),
+        (lambda do: do.look_at(0, (1, 1, 1), trunk=True), "look_at: trunk is not a number; got 'True'"),
+        (lambda do: do.look_at(0, (1, 1, 1), trunk=float("nan")), "look_at: trunk is out of range; got nan"),
+        (lambda do: do.look_at(0, (1, 1, 1), trunk=10**400), "look_at: trunk is too large; got 'a whole"),
         (lambda do: do.look_at(0, (1, 1, 1), trunk=1.5), "look_at: trunk is out of range; got 1.5"),
         (lambda do: do.reach(0, (1, 1, 1), seconds="1"), "reach: seconds is not a number; got '1'"),
         (lambda do: do.reach(0, (1, 1, 1), hold="long"), "reach: hold is not a number; got 'long'"),
