@@ -11,10 +11,11 @@ from crowd.motion.hand import hand_table
 from crowd.world.mesh import Mesh
 from crowd.world.objects import Objects, ShapeKind
 from crowd.world.shape_table import shape_table
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.grasp import close_hands, measure_gaps
+from crowd_kernels.grasp import CHUNKS, close_hands, measure_gaps
 from crowd_kernels.hand_placement import place_hands
-from crowd_kernels.hand_pose import compose_frames, hands_in_world, pose_hands
+from crowd_kernels.hand_pose import FINGER_ROW, compose_frames, hands_in_world, pose_hands
 
 DEEPEST = 1e-4
 """m."""
@@ -143,10 +144,23 @@ class Holding:
     grip: Any
     hands: Any
     items: Any
+    grab_object: Any
+    scratch: Any
 
     def pose_fingers(self) -> None:
         """Write all fingers."""
-        pose_hands(self.hand, self.character, self.side, self.style, self.weight, self.closure, self.pose)
+        people = np.arange(len(self.pose), dtype=np.int32)
+        pose_hands(
+            self.hand,
+            self.grab_object,
+            self.style,
+            0.0,
+            people,
+            self.closure,
+            self.scratch,
+            self.weight,
+            self.pose,
+        )
 
     def follow(self) -> None:
         """Let all objects follow."""
@@ -178,12 +192,13 @@ def holding(size: int, rng: np.random.Generator) -> Holding:
     pose[:, 0] = 1
     return Holding(
         hand_table(build_skeleton()), np.repeat(np.arange(size, dtype=np.int32), 2),
-        np.tile(np.array([0, 1], np.int32), size), np.zeros(count, np.int32), np.ones(count),
+        np.tile(np.array([0, 1], np.int32), size), np.zeros((size, 2), np.int32), np.ones((size, 2)),
         rng.uniform(0, 1, (size, 2, 15)).astype(np.float32), pose.reshape(size, -1),
         rng.normal(size=(size, 2, 3)).astype(np.float32), turn.reshape(size, 2, 4).astype(np.float32),
         rng.normal(size=(size, 3)), rng.uniform(-3, 3, size),
         (rng.normal(size=(count, 3)), turn[::-1].copy()), (np.zeros((count, 3)), np.zeros((count, 4))),
         (np.zeros((count, 3)), np.zeros((count, 4))),
+        np.zeros((size, 2), np.int32), aligned_zeros((CHUNKS, FINGER_ROW), np.float32),
     )  # fmt: skip
 
 

@@ -35,6 +35,9 @@ SLOWEST = 0.3
 """Speeds below this are too small for a relative error, m/s."""
 SHORTEST_STANCE = 0.05
 """Contacts shorter than this are no stances, s."""
+HEEL = 1
+"""Contact of a foot whose heel alone is planted."""
+FULL_TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
@@ -223,57 +226,61 @@ class FootMetrics:
 
     def __init__(self) -> None:
         self._drift = Histogram(1e-5, 1.0)
-        self._contact: npt.NDArray[np.uint8] | None = None
+        self._contact: npt.NDArray[np.uint8] = np.zeros((0, 2), np.uint8)
         self._spawn: npt.NDArray[np.integer[Any]] = np.zeros(0, np.int64)
-        self._anchor: FloatArray = np.zeros(0)
-        self._latest: FloatArray = np.zeros(0)
-        self._total: FloatArray = np.zeros(0)
-        self._since: FloatArray = np.zeros(0)
+        self._point: FloatArray = np.zeros((0, 2, 2, 3))
+        self._anchor: FloatArray = np.zeros((0, 2, 2))
+        self._total: FloatArray = np.zeros((0, 2))
+        self._since: FloatArray = np.zeros((0, 2))
         self._time = 0.0
 
     def add(self, frame: Observation) -> None:
-        """Follow every planted foot."""
-        contact = np.where(frame.is_active[:, None], frame.foot_contact, 0).astype(np.uint8)
-        if self._contact is None:
+        """Follow every planted foot: nothing is to be done while its contact stays what it is."""
+        contact = frame.foot_contact * frame.is_active[:, None]
+        if len(self._contact) == 0:
             self._contact = np.zeros_like(contact)
-            self._anchor = np.zeros((*contact.shape, 2))
-            self._latest = np.zeros((*contact.shape, 2))
-            self._total = np.zeros(contact.shape)
-            self._since = np.zeros(contact.shape)
             self._spawn = frame.spawn_count.copy()
-        changed = (contact != self._contact) | (frame.spawn_count != self._spawn)[:, None]
-        ended = changed & (self._contact > 0)
-        self._total[ended] += np.hypot(*(self._latest[ended] - self._anchor[ended]).T)
-        over = ended & ((contact == 0) | (frame.spawn_count != self._spawn)[:, None])
-        self._count_stances(over)
-        began = changed & (contact > 0)
-        fresh = began & ((self._contact == 0) | (frame.spawn_count != self._spawn)[:, None])
-        self._total[fresh] = 0.0
-        self._since[fresh] = frame.time
-        point = np.where(
-            (contact == 1)[..., None], frame.foot_point_world[:, :, 0], frame.foot_point_world[:, :, 1]
-        )
-        here = point[..., [0, 2]]
-        self._anchor[began] = here[began]
-        self._latest = here
-        self._contact = contact
+            self._point = frame.foot_point_world.copy()
+            self._anchor = np.zeros((*contact.shape, 2))
+            self._total, self._since = np.zeros(contact.shape), np.zeros(contact.shape)
+        is_other = frame.spawn_count != self._spawn
+        rows, feet = np.nonzero((contact != self._contact) | is_other[:, None])
+        before, now = self._contact[rows, feet], contact[rows, feet]
+        ended = before > 0
+        self._total[rows[ended], feet[ended]] += self._drift_of(rows[ended], feet[ended])
+        over = ended & ((now == 0) | is_other[rows])
+        self._count_stances(rows[over], feet[over])
+        began = now > 0
+        fresh = began & ((before == 0) | is_other[rows])
+        self._total[rows[fresh], feet[fresh]] = 0.0
+        self._since[rows[fresh], feet[fresh]] = frame.time
+        np.copyto(self._point, frame.foot_point_world)
+        self._contact, self._time = contact, frame.time
         self._spawn = frame.spawn_count.copy()
-        self._time = frame.time
+        self._anchor[rows[began], feet[began]] = self._planted_point(rows[began], feet[began])
 
-    def _count_stances(self, feet: BoolArray) -> None:
-        lasting = feet & (self._time - self._since >= SHORTEST_STANCE)
-        self._drift.add(self._total[lasting])
+    def _planted_point(self, rows: npt.NDArray[np.intp], feet: npt.NDArray[np.intp]) -> FloatArray:
+        """Where heel or ball of planted feet were in the last frame, x and z, m. (K, 2)"""
+        part = (self._contact[rows, feet] != HEEL).astype(np.intp)
+        return np.asarray(self._point[rows, feet, part][:, [0, 2]])
+
+    def _drift_of(self, rows: npt.NDArray[np.intp], feet: npt.NDArray[np.intp]) -> FloatArray:
+        """How far planted feet have come from where their contact began, m. (K,)"""
+        away = self._planted_point(rows, feet) - self._anchor[rows, feet]
+        return np.asarray(np.hypot(away[:, 0], away[:, 1]))
+
+    def _count_stances(self, rows: npt.NDArray[np.intp], feet: npt.NDArray[np.intp]) -> None:
+        lasting = self._time - self._since[rows, feet] >= SHORTEST_STANCE
+        self._drift.add(self._total[rows[lasting], feet[lasting]])
 
     def as_dict(self) -> dict[str, float | int]:
         """Figures by key; feet that are still planted count as they stand."""
-        if self._contact is None:
-            return {}
         everything = Histogram(1e-5, 1.0)
         everything._counts[:] = self._drift._counts
         everything.count, everything.total = self._drift.count, self._drift.total
         everything.maximum = self._drift.maximum
-        planted = (self._contact > 0) & (self._time - self._since >= SHORTEST_STANCE)
-        everything.add(self._total[planted] + np.hypot(*(self._latest[planted] - self._anchor[planted]).T))
+        planted = np.nonzero((self._contact > 0) & (self._time - self._since >= SHORTEST_STANCE))
+        everything.add(self._total[planted] + self._drift_of(*planted))
         if everything.count == 0:
             return {}
         return {
@@ -312,7 +319,8 @@ class MotionMetrics:
             return
         step = frame.position_world - self._position
         self._path += np.hypot(step[:, 0], step[:, 2])
-        self._turn += np.angle(np.exp(1j * (frame.yaw - self._yaw)))
+        turned = frame.yaw - self._yaw
+        self._turn += turned - FULL_TURN * np.round(turned / FULL_TURN)
         self._position, self._yaw = frame.position_world.copy(), frame.yaw.copy()
         dt = frame.time - self._time
         self._time = frame.time

@@ -22,9 +22,10 @@ from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
 from crowd.world.shape_table import shape_table
 from crowd_kernels import reach_goal
-from crowd_kernels.grasp import close_hands, measure_gaps
+from crowd_kernels.aligned import aligned_zeros
+from crowd_kernels.grasp import CHUNKS, close_hands, measure_gaps
 from crowd_kernels.hand_placement import TOO_BIG
-from crowd_kernels.hand_pose import pose_hands
+from crowd_kernels.hand_pose import FINGER_ROW, pose_hands
 
 OPEN, CLOSING, HOLDING, OPENING = range(4)
 NOTHING, GRASP, TOUCH, GRASP_BOTH, AWAIT = range(5)
@@ -127,6 +128,7 @@ class Grab:
         self.placement = GripPlacement(model, self.hand, self.shapes, objects, joints)
         self.carrying = Carrying(model, self.holding, self.placement, reach)
         self._scale = self.placement.scale
+        self._scratch = aligned_zeros((CHUNKS, FINGER_ROW), np.float32)
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people with empty hands."""
@@ -302,29 +304,23 @@ class Grab:
 
     def evaluate(self, step: Step) -> None:
         """Advance the fingers of hands that are at work and write them into the poses."""
-        state, settings = step.state, self.settings
-        busy = (state.grab_object[step.active] >= 0) | (state.grab_weight[step.active] > 0.0)
-        place, hands = np.nonzero(busy)
-        if place.size == 0:
+        state = step.state
+        busy = (state.grab_object >= 0) | (state.grab_weight > 0.0)
+        busy &= state.is_active[:, None]
+        if not busy.any():
             return
-        rows, hands = step.active[place], hands.astype(np.int32)
-        is_wanted = state.grab_object[rows, hands] >= 0
-        change = np.where(is_wanted, 1.0, -1.0) * step.dt / settings.shape_time
-        weight = np.clip(state.grab_weight[rows, hands] + change, 0.0, 1.0)
-        state.grab_weight[rows, hands] = weight
-        stage = state.grab_stage[rows, hands]
-        opened = rows[stage == OPEN], hands[stage == OPEN]
-        still_closed = state.finger_closure[opened] - np.float32(step.dt / settings.open_time)
-        state.finger_closure[opened] = np.maximum(still_closed, 0.0)
-        self._close(state, (rows[stage == CLOSING], hands[stage == CLOSING]), step.dt)
-        self._go_on_opening(state, (rows[stage == OPENING], hands[stage == OPENING]), step.dt)
+        self._relax(state, _hands_where(busy & (state.grab_stage == OPEN)), step.dt)
+        self._close(state, _hands_where(busy & (state.grab_stage == CLOSING)), step.dt)
+        self._go_on_opening(state, _hands_where(busy & (state.grab_stage == OPENING)), step.dt)
         pose_hands(
             self.hand,
-            rows,
-            hands,
-            np.ascontiguousarray(state.grab_style[rows, hands]),
-            minimum_jerk(weight),
+            state.grab_object,
+            state.grab_style,
+            step.dt / self.settings.shape_time,
+            step.active,
             state.finger_closure,
+            self._scratch,
+            state.grab_weight,
             state.pose_rotation,
         )
 
@@ -332,11 +328,10 @@ class Grab:
         """After the joints are known: hands that have arrived begin to close, held objects follow."""
         state = step.state
         self.holding.drop_of_the_gone(state)
-        place, hands = np.nonzero(state.grab_object[step.active] >= 0)
-        rows, hands = step.active[place], hands.astype(np.int32)
-        waits = (state.grab_stage[rows, hands] == OPEN) & np.isin(
-            state.grab_status[rows, hands], (GrabStatus.APPROACHING, GrabStatus.OUT_OF_REACH)
-        )
+        rows, hands = _hands_where((state.grab_object >= 0) & state.is_active[:, None])
+        status = state.grab_status[rows, hands]
+        waits = (status == GrabStatus.APPROACHING) | (status == GrabStatus.OUT_OF_REACH)
+        waits &= state.grab_stage[rows, hands] == OPEN
         if waits.any():
             awaits = waits & (state.grab_purpose[rows, hands] == AWAIT)
             awaits[awaits] = ~self._is_brought(state, rows[awaits], state.grab_object[rows, hands][awaits])
@@ -595,6 +590,13 @@ class Grab:
             objects.holder_hand[items[held], hand] = False
             self._open(state, (givers, np.full(givers.size, hand, np.int32)), GrabStatus.GIVEN)
 
+    def _relax(self, state: State, hands: Hands, dt: float) -> None:
+        """Open fingers of hands that have not begun to close, and may have had something before."""
+        if hands[0].size == 0:
+            return
+        still_closed = state.finger_closure[hands] - np.float32(dt / self.settings.open_time)
+        state.finger_closure[hands] = np.maximum(still_closed, 0.0)
+
     def _close(self, state: State, hands: Hands, dt: float) -> None:
         """Go on closing."""
         if hands[0].size == 0:
@@ -680,3 +682,9 @@ def _listed(
     hands = np.broadcast_to(np.asarray(hand, np.int32), rows.shape)
     items = np.broadcast_to(np.asarray(item, np.int32), rows.shape)
     return rows, np.ascontiguousarray(hands), np.ascontiguousarray(items)
+
+
+def _hands_where(mask: BoolArray) -> Hands:
+    """Characters and hands for which a mask (N, 2) is true."""
+    rows, hands = np.nonzero(mask)
+    return rows.astype(np.int32), hands.astype(np.int32)

@@ -28,6 +28,7 @@ class Holding:
         self.objects = objects
         self._joints = joints
         self._hand_joint = np.array([skeleton.joint(f"{side}_hand") for side in SIDES], np.int32)
+        self._followed: tuple[npt.NDArray[np.intp], FloatArray] = np.zeros(0, np.intp), np.zeros((0, 3))
 
     def hands_in_world(self, state: State, hands: Hands) -> Frames:
         """Where hand joints are, by the last computed joints."""
@@ -85,13 +86,15 @@ class Holding:
         """Leave objects where they are whose holder has left the scene."""
         objects = self.objects
         gone = (objects.holder >= 0) & ~state.is_active[np.maximum(objects.holder, 0)]
-        objects.holder[gone] = -1
-        objects.holder_hand[gone] = False
+        if gone.any():
+            objects.holder[gone] = -1
+            objects.holder_hand[gone] = False
 
     def follow(self, state: State) -> None:
         """Move held objects with hands; between two hands they take the middle of what both ask for."""
         objects = self.objects
         items, (place, turn) = self._asked_by_hands(state)
+        self._followed = items, place
         if items.size == 0:
             return
         objects.position_world[items], objects.rotation_world[items] = place, turn
@@ -102,9 +105,9 @@ class Holding:
             objects.position_world[items[second]] = 0.5 * (place[second] + place[second - 1])
             objects.rotation_world[items[second]] = middle / np.linalg.norm(middle, axis=1, keepdims=True)
 
-    def apart(self, state: State) -> FloatArray:
-        """How far objects are from where each hand that holds them has its grip, m. (A,)"""
-        items, (place, _) = self._asked_by_hands(state)
+    def apart(self) -> FloatArray:
+        """How far objects are from where each hand had its grip when they last followed, m. (A,)"""
+        items, place = self._followed
         return np.asarray(np.linalg.norm(self.objects.position_world[items] - place, axis=1))
 
     def _asked_by_hands(self, state: State) -> tuple[npt.NDArray[np.intp], Frames]:
@@ -112,7 +115,12 @@ class Holding:
         objects = self.objects
         items, side = np.nonzero(objects.holder_hand)
         hands = objects.holder[items], side.astype(np.int32)
-        grip = objects.grip_position[items, side], objects.grip_rotation[items, side]
+        # One index of rows is much faster than two.
+        grips = len(SIDES) * items + side
+        grip = (
+            objects.grip_position.reshape(-1, 3).take(grips, axis=0),
+            objects.grip_rotation.reshape(-1, 4).take(grips, axis=0),
+        )
         return items, composed(self.hands_in_world(state, hands), grip)
 
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from operator import attrgetter
 from typing import ClassVar
 
 import numpy as np
@@ -67,6 +68,8 @@ SOLVE = SETTINGS._replace(
     passes=8,  # Arms at many limits at once, far from rotations they cannot have, sway with fewer.
 )
 EFFECTORS = ("right_hand", "left_hand")
+PARTS = attrgetter(*(f"reach_{name}" for name in ReachState._fields))
+"""Fields of the state that the kernels of reaches change."""
 FEWEST_EXAMPLES = 8
 """A library with fewer reaches of a hand takes the built-in ones."""
 
@@ -92,20 +95,23 @@ class ReachSettings:
     wall_distance: float = 0.05
     """m. Walls are looked for again when a target has moved as far as this."""
 
-    def solve_for(self, dt: float) -> SolveSettings:
-        """Settings of the solves in steps of `dt` s, for like motions with any step."""
-        iterations = math.ceil(dt / self.iteration_time - 1e-9)
-        span = dt / iterations
-        stiffness = self.iteration_time / span
-        return self.solve._replace(
-            damping=self.solve.damping * math.sqrt(stiffness),
-            error_damping=self.solve.error_damping * stiffness,
-            turn_error_damping=self.solve.turn_error_damping * stiffness,
-            pull=1.0 - math.exp(-self.fade_rate * span),
-            approach=1.0 - math.exp(-self.limit_rate * span),
-            least_iterations=iterations,
-            most_iterations=iterations,
-        )
+
+@cache
+def solve_settings(settings: ReachSettings, dt: float) -> SolveSettings:
+    """Settings of the solves in steps of `dt` s, for like motions with any step."""
+    iterations = math.ceil(dt / settings.iteration_time - 1e-9)
+    span = dt / iterations
+    stiffness = settings.iteration_time / span
+    solve = settings.solve
+    return solve._replace(
+        damping=solve.damping * math.sqrt(stiffness),
+        error_damping=solve.error_damping * stiffness,
+        turn_error_damping=solve.turn_error_damping * stiffness,
+        pull=1.0 - math.exp(-settings.fade_rate * span),
+        approach=1.0 - math.exp(-settings.limit_rate * span),
+        least_iterations=iterations,
+        most_iterations=iterations,
+    )
 
 
 class Reach:
@@ -294,13 +300,13 @@ class Reach:
     def evaluate(self, step: Step) -> None:
         """Advance reaches, blend the examples over the pose and bring the hands to their targets."""
         state, settings = step.state, self.settings
-        stage = state.reach_stage[step.active]
-        reaching = step.active[(stage != NONE).any(axis=1)]
+        reaches = state.reach_stage != NONE
+        reaching = step.active[(reaches[:, 0] | reaches[:, 1])[step.active]]
         if reaching.size == 0:
             return
         self._follow_moved(state, reaching)
         begins = (state.reach_stage == MOVE) & (state.reach_course == 0.0)
-        parts = ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields))
+        parts = ReachState(*PARTS(state))
         begin = time.perf_counter()
         reach_crowd(
             self.space.arrays,
@@ -363,8 +369,9 @@ class Reach:
             state.reach_last_rotation,
             self._solution,
         )
-        settings = self.settings.solve_for(dt)
-        hands = (self._task[reaching] != 0) @ (1 << np.arange(len(EFFECTORS)))
+        settings = solve_settings(self.settings, dt)
+        asks = (self._task != 0)[reaching]
+        hands = asks[:, 0] + 2 * asks[:, 1]
         for mask, tree in self._trees.items():
             rows = reaching[hands == mask]
             if rows.size == 0:

@@ -11,6 +11,7 @@ from crowd.motion.body import FINGERS, HAND, STATURE
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, swing, to_vector
 from crowd.motion.skeleton import Skeleton
 from crowd_kernels.hand import HandTable
+from crowd_kernels.lanes import LANES
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -142,13 +143,15 @@ def hand_table(skeleton: Skeleton) -> HandTable:
             opened[style, side] = hand_pose(skeleton, side_name, start)
             closed = hand_pose(skeleton, side_name, end)
             sweep[style, side] = to_vector(multiply(conjugate(opened[style, side]), closed))
+    lanes = np.zeros((len(STYLES), 2, 7, LANES), np.float32)
+    lanes[..., :15] = np.concatenate([opened, sweep], axis=-1).swapaxes(-1, -2)
     pinch = np.zeros((2, 3))
     table = HandTable(
         joint, offset, tip, radius, opened, sweep,
         length=np.linalg.norm(tip, axis=-1), angle=np.linalg.norm(sweep, axis=-1), pinch_point=pinch,
         palm_depth=PALM_DEPTH, palm_half_width=PALM_HALF_WIDTH,
         nearest_grip=0.045, farthest_grip=0.075, thumb_clearance=0.030,
-        pinch_half=0.020, span_half=0.062,
+        pinch_half=0.020, span_half=0.062, segment_lanes=lanes.reshape(len(STYLES), 2, -1),
     )  # fmt: skip
     for side in range(2):
         ends = segment_ends(table, side, 1, np.ones(15))[:, 1]

@@ -149,8 +149,8 @@ class Navigator:
             seed=step.seed,
         )
         self.deepest_overlap = report.deepest_overlap
-        moved = state.position_world[step.active] - state.previous_position_world[step.active]
-        state.velocity_world[step.active] = moved / step.dt
+        moved = (state.position_world - state.previous_position_world) / step.dt
+        np.copyto(state.velocity_world, moved, where=state.is_active[:, None])
 
 
 def avoidance_settings(scenario: Scenario) -> AvoidanceSettings:

@@ -54,6 +54,9 @@ class Refusals:
         """Add an event for each refusal since the last step."""
         state = self._simulation.state
         reach, grab = state.reach_refusals - self.reach, state.grab_refusals - self.grab
+        eyes = state.gaze_refusals - self.gaze
+        if not (reach.any() or grab.any() or eyes.any()):
+            return
         for row, hand in np.argwhere((grab > 0) & state.is_active[:, None]):
             why = GrabStatus(int(state.grab_refusal[row, hand]))
             # A hand that could not go to the object: the layer that moves it knows more.
@@ -62,7 +65,6 @@ class Refusals:
             self._add(time, int(row), "grab", reason, int(grab[row, hand]))
         for row, hand in np.argwhere((reach > 0) & (grab <= 0) & state.is_active[:, None]):
             self._add(time, int(row), "reach", self._reach_reason(row, hand), int(reach[row, hand]))
-        eyes = state.gaze_refusals - self.gaze
         for row in np.flatnonzero((eyes > 0) & state.is_active):
             is_finite = np.isfinite(state.gaze_target_world[row]).all()
             why_not = "the target is too near" if is_finite else "there is no target"

@@ -53,6 +53,9 @@ class HandTable(NamedTuple):
     """Objects up to this half thickness are held between the tips."""
     span_half: float
     """Half thickness of the largest objects that one hand can hold."""
+    segment_lanes: Any
+    """(S, 2, 112) float32: `open_rotation` and `sweep`, 7 numbers, for loops with all segments and one more
+    as 16 lanes."""
 
 
 @kernel

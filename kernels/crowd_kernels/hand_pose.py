@@ -2,70 +2,119 @@
 
 from typing import Any
 
-from crowd_kernels._jit import parallel_kernel, prange
+import numpy as np
+
+from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
+from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.grasp import CHUNKS
 from crowd_kernels.hand import (
     FINGERS,
     SEGMENTS,
     HandTable,
-    finger_rotation,
     relative_frame,
     row_quaternion,
     row_vector,
 )
+from crowd_kernels.ik_layout import put_quaternion, quaternion_at, vector_at
+from crowd_kernels.lanes import LANES
+from crowd_kernels.polynomial import sine_cosine
 from crowd_kernels.pose import joint_rotation, set_joint_rotation
 from crowd_kernels.quaternion import from_yaw, multiply, nlerp, normalized, rotate
 from crowd_kernels.vector import add
 
 WHOLE = 1.0 - 1e-6
 """A share above this leaves nothing of the pose below."""
+FINGER_ROW = 5 * LANES
+"""Length of a chunk's scratch row for `pose_hands`: closures and rotations of the segments."""
+HALF: Any = np.float32(0.5)
+TINY: Any = np.float32(1e-12)
+
+
+@inlined_kernel
+def turn_fingers_row(segments: Any, closure: Any, out_rotation: Any) -> None:
+    """Turn all segments of a hand from open to their closures, as `finger_rotation` does one.
+
+    Parameters
+    ----------
+    segments : (112,) float32
+        See `HandTable.segment_lanes`.
+    closure : (16,) float32
+        0 open to 1 closed.
+    out_rotation : (64,) float32
+        Local rotations.
+    """
+    for lane in range(LANES):
+        share = closure[lane]
+        way = vector_at(segments, 4 * LANES, lane)
+        x, y, z = share * way[0], share * way[1], share * way[2]
+        angle = np.sqrt(x * x + y * y + z * z + TINY)
+        sine, cosine = sine_cosine(HALF * angle)
+        scale = sine / angle
+        turn = (cosine, x * scale, y * scale, z * scale)
+        put_quaternion(out_rotation, 0, lane, multiply(quaternion_at(segments, 0, lane), turn))
 
 
 @parallel_kernel
 def pose_hands(
     hand: HandTable,
-    character: Any,
-    side: Any,
+    grab_object: Any,
     style: Any,
-    weight: Any,
+    change: float,
+    active: Any,
     finger_closure: Any,
+    scratch: Any,
+    weight: Any,
     pose_rotation: Any,
 ) -> None:
-    """Mix the fingers of many hands into their poses.
+    """Mix the fingers of hands at work into their poses, and let their share rise or fade.
 
     Parameters
     ----------
     hand : HandTable
-    character : (A,) int32
-        Whose hands; all hands of a character stand together.
-    side : (A,) int32
-        0 right, 1 left.
-    style : (A,) int32
+    grab_object : (N, 2) int32
+        What right and left hand are at; -1 nothing.
+    style : (N, 2) int32
         Style of the grip.
-    weight : (A,) float64
-        Share of the hand's own pose, 0 to 1.
+    change : float
+        By how much the share of a hand rises that is at something, and falls of one that is not.
+    active : (A,) int32
+        Characters to process, each once.
     finger_closure : (N, 2, 15) float32
         0 open to 1 closed.
+    scratch : (32, 80) float32
+        One row of `FINGER_ROW` numbers for each chunk.
+    weight : (N, 2) float64
+        In and out: progress of the hand's own pose from 0 to 1, eased by minimum jerk.
     pose_rotation : (N, 256) float32
-        In and out: pose rows; the finger joints are written.
+        In and out: pose rows; the finger joints of hands with a share are written.
 
     Notes
     -----
     **Source:** Feng, Xu, Shapiro 2012, section 5.3: fingers between an open and a closed pose.
     """
-    count = character.shape[0]
+    count = active.shape[0]
     for k in prange(CHUNKS):
         chunk = (k * 37) % CHUNKS
-        for row in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            pose = pose_rotation[character[row]]
-            closure = finger_closure[character[row], side[row]]
-            share = weight[row]
-            for segment in range(FINGERS * SEGMENTS):
-                joint = hand.joint[side[row], segment]
-                turned = finger_rotation(hand, side[row], style[row], segment, float(closure[segment]))
-                if share < WHOLE:
-                    turned = nlerp(joint_rotation(pose, joint), turned, share)
-                set_joint_rotation(pose, joint, turned)
+        closure, rotation = scratch[chunk, :LANES], scratch[chunk, LANES:FINGER_ROW]
+        for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            row = active[index]
+            pose = pose_rotation[row]
+            for side in range(2):
+                is_at_work = grab_object[row, side] >= 0
+                if not is_at_work and weight[row, side] <= 0.0:
+                    continue
+                risen = weight[row, side] + (change if is_at_work else -change)
+                weight[row, side] = min(max(risen, 0.0), 1.0)
+                share = minimum_jerk(weight[row, side])
+                for segment in range(FINGERS * SEGMENTS):
+                    closure[segment] = finger_closure[row, side, segment]
+                turn_fingers_row(hand.segment_lanes[style[row, side], side], closure, rotation)
+                for segment in range(FINGERS * SEGMENTS):
+                    joint = hand.joint[side, segment]
+                    turned = quaternion_at(rotation, 0, segment)
+                    if share < WHOLE:
+                        turned = nlerp(joint_rotation(pose, joint), turned, share)
+                    set_joint_rotation(pose, joint, turned)
 
 
 @parallel_kernel

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from crowd.motion.easing import minimum_jerk
 from crowd_kernels import _jit
+from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.hand_pose import compose_frames, hands_in_world, pose_hands
+from crowd_kernels.grasp import CHUNKS
+from crowd_kernels.hand_pose import FINGER_ROW, compose_frames, hands_in_world, pose_hands
 from tests.crowd.hand_scenes import HAND, unit_quaternions
 from tests.oracles import hand_pose as oracle
 
@@ -16,25 +19,40 @@ def random_pose(rng, count):
     return (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).reshape(count, -1).astype(np.float32)
 
 
+SCRATCH = aligned_zeros((CHUNKS, FINGER_ROW), np.float32)
+
+
 @pytest.mark.parametrize("weight", [0.0, 0.4, 1.0])
 def test_fingers_are_mixed_into_the_pose(weight, rng):
     pose = random_pose(rng, 6)
     before = pose.copy().reshape(6, 4, -1)
     closure = rng.uniform(0, 1, (6, 2, 15)).astype(np.float32)
-    character, side = np.array([1, 1, 4], np.int32), np.array([0, 1, 1], np.int32)
-    style = np.array([0, 1, 1], np.int32)
-    pose_hands(HAND, character, side, style, np.full(3, weight), closure, pose)
+    item, style = np.full((6, 2), -1, np.int32), rng.integers(0, 2, (6, 2)).astype(np.int32)
+    hands = np.array([1, 1, 4]), np.array([0, 1, 1])
+    item[hands] = [7, 7, 0]
+    share = np.where(item >= 0, weight, 0.0)
+    pose_hands(HAND, item, style, 0.0, np.arange(6, dtype=np.int32), closure, SCRATCH, share, pose)
     after = pose.reshape(6, 4, -1)
-    for row, hand, grip in zip(character, side, style, strict=True):
+    for row, hand in zip(*hands, strict=True):
         joints = HAND.joint[hand]
-        wanted = oracle.fingers(HAND, hand, grip, closure[row, hand])
-        expected = oracle.mixed(before[row][:, joints].T.astype(float), wanted, weight)
+        wanted = oracle.fingers(HAND, hand, style[row, hand], closure[row, hand])
+        expected = oracle.mixed(before[row][:, joints].T.astype(float), wanted, minimum_jerk(weight))
         found = after[row][:, joints].T
         assert np.abs((found * expected).sum(axis=1)) == pytest.approx(1, abs=1e-6)
+        assert np.linalg.norm(found, axis=1) == pytest.approx(1, abs=1e-6)
     touched = np.zeros((6, PADDED_JOINTS), bool)
-    touched[character[:, None], HAND.joint[side]] = True
+    touched[hands[0][:, None], HAND.joint[hands[1]]] = True
     untouched = np.broadcast_to(~touched[:, None], after.shape)
     assert np.array_equal(after[untouched], before[untouched])
+
+
+def test_the_share_of_a_hand_rises_while_it_is_at_something_and_fades_after(rng):
+    item = np.array([[3, -1], [-1, -1], [3, 3]], np.int32)
+    share = np.array([[0.95, 0.04], [0.0, 0.5], [0.2, 0.2]])
+    pose, closure = random_pose(rng, 3), np.zeros((3, 2, 15), np.float32)
+    active, style = np.array([0, 1], np.int32), np.zeros((3, 2), np.int32)
+    pose_hands(HAND, item, style, 0.1, active, closure, SCRATCH, share, pose)
+    assert share == pytest.approx(np.array([[1.0, 0.0], [0.0, 0.4], [0.2, 0.2]]))
 
 
 def test_hands_are_brought_to_the_world(rng):
@@ -68,13 +86,13 @@ def test_frames_are_chained_and_taken_apart(is_inverse, rng):
 
 def test_threads_do_not_change_a_bit(rng):
     pose, closure = random_pose(rng, 200), rng.uniform(0, 1, (200, 2, 15)).astype(np.float32)
-    rows = np.repeat(np.arange(200, dtype=np.int32), 2)
-    side, style = np.tile(np.array([0, 1], np.int32), 200), rng.integers(0, 2, 400).astype(np.int32)
+    rows, item = np.arange(200, dtype=np.int32), rng.integers(-1, 3, (200, 2)).astype(np.int32)
+    style = rng.integers(0, 2, (200, 2)).astype(np.int32)
     results = []
     for threads in (1, min(2, _jit.maximum_thread_count())):
         _jit.set_thread_count(threads)
         own = pose.copy()
-        pose_hands(HAND, rows, side, style, np.full(400, 0.7), closure, own)
+        pose_hands(HAND, item, style, 0.1, rows, closure, SCRATCH, np.full((200, 2), 0.6), own)
         results.append(own)
     _jit.set_thread_count(1)
     assert np.array_equal(*results)
