@@ -14,6 +14,8 @@ FloatArray = npt.NDArray[np.float64]
 PURPOSE_TEMPO = 201
 HANDING_HEIGHT = 0.66
 """Height at which people hand things over, over stature."""
+SEATED_HANDING_HEIGHT = 0.6
+"""Height at which people hand things to somebody who sits, over the other's stature."""
 SHOULDER_HEIGHT, SHOULDER_SIDE = 0.82, 0.10
 """Of somebody who stands, over stature."""
 SEATED_SHOULDER_HEIGHT, SEATED_SHOULDER_BEHIND = 0.575, 0.20

@@ -184,6 +184,11 @@ class Grab:
         """Tell which objects single hands cannot hold; arguments as in `grasp`. (M,)"""
         return np.asarray(self.placement.of_one_hand(state, *_listed(characters, hand, item))[3] == TOO_BIG)
 
+    def is_too_big_for_both(self, state: State, characters: IntArray, item: npt.ArrayLike) -> BoolArray:
+        """Tell which objects two hands cannot hold; arguments as in `grasp_both`. (M,)"""
+        rows, _, items = _listed(characters, 0, item)
+        return ~self.placement.of_both_hands(state, rows, items)[2]
+
     def touch(self, state: State, characters: IntArray, hand: npt.ArrayLike, item: npt.ArrayLike) -> None:
         """Let hands go to objects and lie on them without closing; arguments as in `grasp`."""
         rows, hands, items = _listed(characters, hand, item)

@@ -92,6 +92,9 @@ class Navigator:
             self._responsibility,
             self._mobility,
         )
+        # Nobody is pushed off a seat, or steps aside from there.
+        sits = state.is_seated | (state.sitting_time > 0.0)
+        self._mobility[sits] = 0.0
         np.maximum(HASTE * self._wanted_speed, SHORTEST_MAXIMUM_SPEED, out=self._maximum_speed)
         self.avoidance.steer(
             state.position_world,
@@ -107,6 +110,7 @@ class Navigator:
             seed=step.seed,
             step=step.index,
         )
+        state.desired_velocity_world[sits] = 0.0
 
     def half_planes(self, state: State, character: int, dt: float, seed: int) -> tuple[FloatArray, int]:
         """What restricts one character's next velocity, see `crowd.navigation.half_planes`."""

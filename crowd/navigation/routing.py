@@ -118,6 +118,11 @@ class Routing:
         reachable: BoolArray = self.status[characters] == 0
         return reachable
 
+    def is_cut_off(self, characters: IntArray) -> BoolArray:
+        """Which characters (M,) have no way to their goal, as far as ways for the present world are known."""
+        is_known = np.array_equal(self.known_world, self.world.digest)
+        return ~self.is_reachable(characters) & ~self.is_stale[characters] & is_known
+
     def set_goals(
         self, characters: IntArray, goal_world: FloatArray, radius: FloatArray, position_world: FloatArray
     ) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from crowd.controllers.grab import HOLDING
 from crowd.motion.rotation import about, conjugate, multiply, yaw_of
-from crowd.people import HANDING_HEIGHT
+from crowd.people import HANDING_HEIGHT, SEATED_HANDING_HEIGHT
 from crowd.state import FloatArray
 from crowd.tasks.events import EventKind
 from crowd.tasks.present_task import (
@@ -21,6 +21,7 @@ from crowd.tasks.present_task import (
     hands_of,
     held_object,
     holding_hand,
+    is_too_big,
     rows_of,
     task_of,
     wanted_hand,
@@ -140,6 +141,8 @@ def grasp_offered(tasks: Tasks, row: int, time: float) -> Outcome:
     if wanted_hand(tasks, row) == Hand.ANY:
         both = holding_hand(tasks, item) == Hand.BOTH
         tasks.hand[row] = Hand.BOTH if both else free_hand(tasks, row, item)
+    if is_too_big(tasks, row, item):
+        return Outcome.TOO_BIG
     return grasp(tasks, row, time) if are_empty(tasks, row) else Outcome.HANDS_FULL
 
 
@@ -224,7 +227,10 @@ def offer(tasks: Tasks, row: int, time: float) -> Outcome:
     simulation, state = tasks.simulation, tasks.simulation.state
     ahead = np.array([math.sin(state.yaw[row]), 0.0, math.cos(state.yaw[row])])
     point = state.position_world[row] + OFFER_DISTANCE * ahead
-    point[1] = HANDING_HEIGHT * float(simulation.model.people.stature[row])
+    stature = simulation.model.people.stature
+    _, taker, _ = task_of(tasks, row)
+    is_low = state.is_seated[taker]
+    point[1] = SEATED_HANDING_HEIGHT * stature[taker] if is_low else HANDING_HEIGHT * stature[row]
     hand = hands_of(tasks, row)[0]
     if tasks.hand[row] == Hand.BOTH:
         turn = simulation.objects.rotation_world[int(tasks.object[row])]
@@ -282,6 +288,7 @@ def let_go_of_everything(tasks: Tasks, row: int) -> None:
     tasks.claimed_by[tasks.claimed_by == row] = -1
     tasks.has_place[row] = False
     state.is_directed[row] = False
+    state.wants_to_walk[row] = False
     for hand in (0, 1):
         if state.reach_stage[row, hand] != NONE:
             simulation.reach.end(state, rows, hand)

@@ -18,10 +18,13 @@ from crowd.tasks.present_task import (
     free_hand,
     held_object,
     holding_hand,
+    is_too_big,
+    takes_seated,
     task_of,
     wanted_hand,
 )
 from crowd.tasks.standing_place import find_standing_place, is_behind_walls
+from crowd.tasks.support import is_carried
 from crowd.tasks.task_list import Hand, Target, TaskKind
 from crowd.tasks.waits import Outcome
 from crowd.world.furniture import Furniture
@@ -37,6 +40,10 @@ SEATED_SIDE = 1.1
 """Angle to a side within which they do, rad."""
 MEETING_DISTANCE = 0.95
 """Distance of two people who hand something over, m."""
+SEATED_MEETING = 0.62
+"""Distance from the feet of somebody who sits at which others give something, m."""
+SEATED_TURN = 1.75
+"""Angle to a side up to which they do, rad: who sits at a table is given things from beside."""
 CHEST = 0.7
 """Height over stature at which no wall may be between them."""
 SPOT_GAP = 0.16
@@ -102,7 +109,10 @@ def choose_object(tasks: Tasks, row: int, time: float) -> Outcome:
     for item in nearest:
         tasks.hand[row] = free_hand(tasks, row, int(item))
         tasks.target_world[row] = objects.position_world[item]
-        outcome = _take_place(tasks, row) if are_empty(tasks, row) else Outcome.HANDS_FULL
+        if not are_empty(tasks, row):
+            outcome = Outcome.HANDS_FULL
+        else:
+            outcome = Outcome.TOO_BIG if is_too_big(tasks, row, int(item)) else _take_place(tasks, row)
         if outcome is Outcome.NEXT:
             tasks.object[row] = item
             tasks.claimed_by[item] = row
@@ -167,7 +177,10 @@ def choose_spot(tasks: Tasks, row: int, time: float) -> Outcome:
     rotation = simulation.model.objects.start_rotation_world[item]
     lift = np.array([0.0, -simulation.model.objects.lowest_point(item, rotation), 0.0])
     places = (point[None] if kind is Target.POINT else _free_spots(tasks, row, group)) + lift
-    return _take_first_place(tasks, row, places[~_are_in_others(tasks, item, places)])
+    outcome = _take_first_place(tasks, row, places[~_are_in_others(tasks, item, places)])
+    if outcome is Outcome.NEXT and kind is Target.POINT and not is_carried(simulation, item, point):
+        return Outcome.IN_THE_AIR
+    return outcome
 
 
 def _are_in_others(tasks: Tasks, item: int, places_world: FloatArray) -> BoolArray:
@@ -223,15 +236,18 @@ def choose_seat(tasks: Tasks, row: int, time: float) -> Outcome:
     radius = float(simulation.model.radius[row])
     here = simulation.state.position_world[row]
     found = []
+    has_room = False
     for index in tasks.names.groups[group].rows:
         place, yaw = simulation.model.furniture[index].sitting_place(radius + SEAT_CLEARANCE)
-        if simulation.model.world.is_walkable(place[None], radius)[0] and not _is_place_taken(
-            tasks, row, place
-        ):
-            found.append((float(np.linalg.norm(place - here)), index, place, yaw))
+        if not simulation.model.world.is_walkable(place[None], radius)[0]:
+            continue
+        has_room = True
+        if not _is_place_taken(tasks, row, place):
+            is_cut_off = not simulation.model.world.is_reachable(here[None], place[None], radius)[0]
+            found.append((is_cut_off, float(np.linalg.norm(place - here)), index, place, yaw))
     if not found:
-        return Outcome.FAIL
-    _, _, place, yaw = min(found, key=lambda entry: entry[:2])
+        return Outcome.FAIL if has_room else Outcome.BEHIND_WALLS
+    _, _, _, place, yaw = min(found, key=lambda entry: entry[:3])
     tasks.place_world[row], tasks.place_yaw[row] = place, yaw
     tasks.has_place[row] = True
     return Outcome.NEXT
@@ -246,31 +262,43 @@ def _is_place_taken(tasks: Tasks, row: int, place: FloatArray) -> bool:
     return bool((np.linalg.norm(np.concatenate(at) - place, axis=1) < 0.3).any())
 
 
-def choose_taker(tasks: Tasks, row: int, time: float) -> Outcome:
-    """Find a place before the person who takes what the hand holds."""
-    simulation, state = tasks.simulation, tasks.simulation.state
+def find_taker(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Wait until the person who takes what the hand holds has nothing else to do, nor another way to go."""
     item = held_object(tasks, row, wanted_hand(tasks, row))
-    _, other, _ = task_of(tasks, row)
     if item < 0:
         return Outcome.EMPTY_HANDED
     if (outcome := find_partner(tasks, row, time)) is not Outcome.NEXT:
         return outcome
     tasks.object[row] = item
     tasks.hand[row] = holding_hand(tasks, item)
-    ahead = state.yaw[other] + np.linspace(0.0, math.pi, 7)[:, None] * np.array([1.0, -1.0])
-    yaw = ahead.ravel()
-    places = state.position_world[other] + MEETING_DISTANCE * np.stack(
+    return Outcome.WAIT
+
+
+def choose_meeting(tasks: Tasks, row: int, time: float) -> Outcome:
+    """Find a place before the person who takes what the hand holds."""
+    simulation, state = tasks.simulation, tasks.simulation.state
+    _, other, _ = task_of(tasks, row)
+    # Who sits does not turn round.
+    stays_seated = takes_seated(tasks, row, other)
+    widest, distance = (SEATED_TURN, SEATED_MEETING) if stays_seated else (math.pi, MEETING_DISTANCE)
+    aside = np.linspace(0.0, widest, 7).repeat(2) * np.tile([1.0, -1.0], 7)
+    yaw = state.yaw[other] + aside
+    places = state.position_world[other] + distance * np.stack(
         [np.sin(yaw), np.zeros_like(yaw), np.cos(yaw)], axis=1
     )
-    world = simulation.model.world
-    fits = world.is_walkable(places, float(simulation.model.radius[row]))
+    world, radius = simulation.model.world, float(simulation.model.radius[row])
+    fits = world.is_walkable(places, radius)
     chest = [0.0, CHEST * float(simulation.model.people.stature[other]), 0.0]
     fits &= ~world.is_blocked(
         places + chest, np.broadcast_to(state.position_world[other] + chest, places.shape)
     )
     if not fits.any():
         return Outcome.FAIL
-    chosen = places[int(np.flatnonzero(fits)[0])]
+    here = np.broadcast_to(state.position_world[row], places.shape)
+    is_cut_off = ~world.is_reachable(here, places, radius)
+    away = np.linalg.norm(places - here, axis=1)
+    best = np.lexsort((away, np.abs(aside), is_cut_off, ~fits))[0]
+    chosen = places[best]
     tasks.place_world[row] = chosen
     way = state.position_world[other] - chosen
     tasks.place_yaw[row] = math.atan2(way[0], way[2])
@@ -290,6 +318,9 @@ def face_giver(tasks: Tasks, row: int, time: float) -> Outcome:
     state = tasks.simulation.state
     _, other, _ = task_of(tasks, row)
     tasks.hand[row] = free_hand(tasks, row)
+    if takes_seated(tasks, other, row):
+        tasks.has_place[row] = False
+        return Outcome.NEXT
     way = state.position_world[other] - state.position_world[row]
     tasks.place_world[row] = state.position_world[row]
     tasks.place_yaw[row] = math.atan2(way[0], way[2])

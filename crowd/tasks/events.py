@@ -18,7 +18,7 @@ class EventKind(StrEnum):
     OBJECT_TAKEN = "object_taken"
     OBJECT_PUT_DOWN = "object_put_down"
     TARGET_REFUSED = "target_refused"
-    """A hand or the gaze was sent to what it cannot go to."""
+    """A hand, the gaze or a walker was sent to what it cannot go to."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Event:
     kind : EventKind
     task : str
         The task's action, such as ``"pick_up"``; of refused targets that no task asked for the layer:
-        ``"reach"``, ``"grab"`` or ``"gaze"``.
+        ``"reach"``, ``"grab"`` or ``"gaze"``, and ``"walk"`` of goals.
     detail : str
         The object's name, or why a task failed or a target was refused.
     """

@@ -20,7 +20,7 @@ from crowd.tasks.partners import check_partners, missing_half
 from crowd.tasks.programs import PROGRAMS
 from crowd.tasks.settle import settle_parameters
 from crowd.tasks.task_list import TaskArrays, TaskEncoder, TaskKind, TaskNames, scenario_tasks
-from crowd.tasks.waits import WAITS_FOR_SOMEBODY, Outcome, Wait, has_failed, is_over
+from crowd.tasks.waits import WAITS_FOR_SOMEBODY, Outcome, Wait, has_failed, has_no_way, is_over
 
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
@@ -39,6 +39,9 @@ HOPELESS = {
     Outcome.HANDS_FULL: "the hands hold something else",
     Outcome.BEHIND_WALLS: "obstacles are in the way from every place to stand",
     Outcome.NOTHING_LEFT: "all of the kind have been put down already",
+    Outcome.TOO_BIG: "the object is too big for the hands that were asked",
+    Outcome.IN_THE_AIR: "there is nothing to put it on",
+    Outcome.NO_WAY: "there is no way there",
 }
 """Why tasks fail without another look."""
 RESTING = 255
@@ -172,12 +175,15 @@ class Tasks:
         ended = is_over(self, step, doing)
         is_late = (self.until[doing] <= step.time) & ~ended
         has_failed_now = has_failed(self, step, doing) & ~ended
+        cut_off = doing[has_no_way(self, step, doing) & ~ended]
         for row in doing[ended]:
             self._advance(int(row), step.time)
         for row in doing[has_failed_now]:
             self._retry(int(row), step.time, "the hand cannot do it")
         for row in doing[is_late & ~has_failed_now]:
             self._time_out(int(row), step.time)
+        for row in cut_off:
+            self._break_off(int(row), step.time, Outcome.NO_WAY)
         for row in doing[np.isin(self.wait[doing], WAITS_FOR_SOMEBODY)]:
             if why := missing_half(self, int(row)):
                 let_go_of_everything(self, int(row))
@@ -210,17 +216,19 @@ class Tasks:
             if outcome is Outcome.DONE:
                 self._finish(row, time)
                 return
-            may_change = self.simulation.model.timetable.changes_after(time)
-            if outcome is Outcome.FAIL or (outcome is Outcome.BEHIND_WALLS and may_change):
-                self._look_again(row, time)
+            if outcome is not Outcome.NEXT:
+                self._break_off(row, time, outcome)
                 return
-            if outcome is Outcome.ALONE:
-                self._give_up(row, time, missing_half(self, row))
-                return
-            if outcome in HOPELESS:
-                let_go_of_everything(self, row)
-                self._give_up(row, time, HOPELESS[outcome])
-                return
+
+    def _break_off(self, row: int, time: float, outcome: Outcome) -> None:
+        """Look again later for what may be there then, or give the task up."""
+        may_change = self.simulation.model.timetable.changes_after(time)
+        if outcome is Outcome.FAIL or (outcome is Outcome.BEHIND_WALLS and may_change):
+            self._look_again(row, time)
+            return
+        let_go_of_everything(self, row)
+        why = missing_half(self, row) if outcome is Outcome.ALONE else HOPELESS[outcome]
+        self._give_up(row, time, why)
 
     def _time_out(self, row: int, time: float) -> None:
         """End a move whose time is over: waiting for time ends so, everything else has failed."""

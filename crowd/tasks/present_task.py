@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crowd.state import FloatArray, IntArray
-from crowd.tasks.task_list import Hand, Target
+from crowd.tasks.task_list import Hand, Target, TaskKind
 
 if TYPE_CHECKING:
     from crowd.tasks.execution import Tasks
@@ -26,6 +26,13 @@ def task_of(tasks: Tasks, row: int) -> tuple[Target, int, FloatArray]:
         int(lists.target[row, column]),
         lists.point[row, column],
     )
+
+
+def does(tasks: Tasks, row: int, kind: TaskKind, target: int) -> bool:
+    """Whether a person is at a task of this kind about this target."""
+    lists, column = tasks.lists, tasks.index[row]
+    is_busy = column < lists.count[row]
+    return bool(is_busy and lists.kind[row, column] == kind and lists.target[row, column] == target)
 
 
 def hands_of(tasks: Tasks, row: int) -> tuple[int, ...]:
@@ -54,17 +61,31 @@ def holding_hand(tasks: Tasks, item: int) -> int:
     return Hand.BOTH if right and left else Hand.LEFT if left else Hand.RIGHT
 
 
+def takes_seated(tasks: Tasks, giver: int, taker: int) -> bool:
+    """Whether somebody sits and takes what another one gives without standing up: what one hand holds."""
+    item = held_object(tasks, giver)
+    return bool(tasks.simulation.state.is_seated[taker]) and holding_hand(tasks, item) != Hand.BOTH
+
+
 def free_hand(tasks: Tasks, row: int, item: int = -1) -> int:
     """The hand that the task asks for; without a wish both for what is too big for one, or an empty one."""
     wanted = wanted_hand(tasks, row)
     if wanted != Hand.ANY:
         return wanted
-    objects = tasks.simulation.objects
+    simulation, objects = tasks.simulation, tasks.simulation.objects
     mine = objects.holder == row
     hand = Hand.LEFT if (objects.holder_hand[mine, 0]).any() else Hand.RIGHT
-    if item >= 0 and tasks.simulation.grab.is_too_big(tasks.simulation.state, rows_of(row), hand, item)[0]:
+    if item >= 0 and simulation.grab.is_too_big(simulation.state, rows_of(row), hand, item)[0]:
         return Hand.BOTH
     return hand
+
+
+def is_too_big(tasks: Tasks, row: int, item: int) -> bool:
+    """The hands that do the present task cannot hold the object."""
+    grab, state = tasks.simulation.grab, tasks.simulation.state
+    if tasks.hand[row] == Hand.BOTH:
+        return bool(grab.is_too_big_for_both(state, rows_of(row), item)[0])
+    return bool(grab.is_too_big(state, rows_of(row), tasks.hand[row], item)[0])
 
 
 def are_empty(tasks: Tasks, row: int) -> bool:

@@ -29,14 +29,15 @@ from crowd.tasks.acting import (
 )
 from crowd.tasks.choosing import (
     choose_look,
+    choose_meeting,
     choose_object,
     choose_seat,
     choose_spot,
-    choose_taker,
     choose_touch,
     choose_walk,
     face_giver,
     find_partner,
+    find_taker,
 )
 from crowd.tasks.task_list import TaskKind
 from crowd.tasks.waits import Outcome, Wait
@@ -104,7 +105,8 @@ PROGRAMS: dict[TaskKind, tuple[Move, ...]] = {
         LOOK_AWAY,
     ),
     TaskKind.HAND_OVER: (
-        Move(choose_taker),
+        Move(find_taker, Wait.TAKER_THERE, LONGEST_MEETING),
+        Move(choose_meeting),
         *GO_THERE,
         Move(wait, Wait.TAKER_READY, LONGEST_MEETING),
         Move(offer, Wait.TAKEN, LONGEST_MEETING),
@@ -115,6 +117,7 @@ PROGRAMS: dict[TaskKind, tuple[Move, ...]] = {
         Move(find_partner),
         Move(wait, Wait.GIVER_NEAR, LONGEST_MEETING),
         Move(face_giver),
+        RISE,
         Move(settle, Wait.SETTLED, LONGEST_SETTLING),
         Move(stand_still, Wait.STANDING, 3.0),
         Move(wait, Wait.OFFERED, LONGEST_MEETING),

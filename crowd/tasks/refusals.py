@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.controllers.grab import GrabStatus
-from crowd.state import IntArray
+from crowd.state import BoolArray, IntArray
 from crowd.tasks.events import EventKind
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ class Refusals:
         Refusals of hands until the step before.
     gaze : (N,) int32
         Likewise of the eyes.
+    is_cut_off : (N,) bool
+        Who has been told that there is no way to the goal.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -45,10 +47,11 @@ class Refusals:
         self.reach: IntArray = np.zeros((capacity, 2), np.int32)
         self.grab: IntArray = np.zeros((capacity, 2), np.int32)
         self.gaze: IntArray = np.zeros(capacity, np.int32)
+        self.is_cut_off: BoolArray = np.zeros(capacity, np.bool_)
 
     def state_fields(self) -> dict[str, npt.NDArray[Any]]:
         """Arrays that change in a run."""
-        return {"reach": self.reach, "grab": self.grab, "gaze": self.gaze}
+        return {"reach": self.reach, "grab": self.grab, "gaze": self.gaze, "is_cut_off": self.is_cut_off}
 
     def tell(self, time: float) -> None:
         """Add an event for each refusal since the last step."""
@@ -69,11 +72,23 @@ class Refusals:
             is_finite = np.isfinite(state.gaze_target_world[row]).all()
             why_not = "the target is too near" if is_finite else "there is no target"
             self._add(time, int(row), "gaze", why_not, int(eyes[row]))
+        self._tell_of_ways(time)
         self.reach[:], self.grab[:], self.gaze[:] = (
             state.reach_refusals,
             state.grab_refusals,
             state.gaze_refusals,
         )
+
+    def _tell_of_ways(self, time: float) -> None:
+        """Add an event for each walker who no longer finds a way to its goal; those of tasks give up."""
+        simulation, state = self._simulation, self._simulation.state
+        rows = np.flatnonzero(state.is_active & state.wants_to_walk).astype(np.int32)
+        is_cut_off = np.zeros_like(self.is_cut_off)
+        is_cut_off[rows] = simulation.navigator.routing.is_cut_off(rows)
+        for row in np.flatnonzero(is_cut_off & ~self.is_cut_off):
+            if not simulation.tasks.has_more(np.array([row], np.int32))[0]:
+                self._add(time, int(row), "walk", "there is no way to the goal", 1)
+        self.is_cut_off[:] = is_cut_off
 
     def _add(self, time: float, row: int, layer: str, why: str, count: int) -> None:
         tasks = self._simulation.tasks

@@ -12,8 +12,9 @@ from crowd.controllers.carrying import CARRYING
 from crowd.controllers.controller import Step
 from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
 from crowd.state import BoolArray, IntArray
+from crowd.tasks.present_task import does
 from crowd.tasks.settle import is_settled
-from crowd.tasks.task_list import Hand
+from crowd.tasks.task_list import Hand, TaskKind
 from crowd_kernels.reach_goal import HOLD, NONE, OUT_OF_REACH, REACHED, REFUSED
 
 if TYPE_CHECKING:
@@ -56,6 +57,12 @@ class Outcome(Enum):
     """It is so already."""
     NOTHING_LEFT = 9
     """All of the kind have been put down, and stay where they are."""
+    TOO_BIG = 10
+    """The hands that are to do it cannot hold it."""
+    IN_THE_AIR = 11
+    """Nothing carries what is put down there."""
+    NO_WAY = 12
+    """Obstacles keep the person away from the place."""
 
 
 class Wait(IntEnum):
@@ -77,9 +84,10 @@ class Wait(IntEnum):
     OFFERED = 13
     TAKEN = 14
     TOUCHING = 15
+    TAKER_THERE = 16
 
 
-WAITS_FOR_SOMEBODY = (Wait.GIVER_NEAR, Wait.TAKER_READY, Wait.OFFERED, Wait.TAKEN)
+WAITS_FOR_SOMEBODY = (Wait.GIVER_NEAR, Wait.TAKER_THERE, Wait.TAKER_READY, Wait.OFFERED, Wait.TAKEN)
 """Waits that only the other person's task ends."""
 
 
@@ -92,6 +100,13 @@ def is_over(tasks: Tasks, step: Step, doing: IntArray) -> BoolArray:
         rows = doing[here]
         over[here] = _has(Wait(int(kind)), tasks, step, rows)
     return over & state.is_active[doing]
+
+
+def has_no_way(tasks: Tasks, step: Step, doing: IntArray) -> BoolArray:
+    """Who walks to a place to which there is no way, and will be none by the scenario. (D,)"""
+    is_cut_off = (tasks.wait[doing] == Wait.ARRIVED) & step.state.wants_to_walk[doing]
+    is_cut_off &= tasks.simulation.navigator.routing.is_cut_off(doing)
+    return np.asarray(is_cut_off & (not step.model.timetable.changes_after(step.time)))
 
 
 def has_failed(tasks: Tasks, step: Step, doing: IntArray) -> BoolArray:
@@ -143,7 +158,7 @@ def _has(wait: Wait, tasks: Tasks, step: Step, rows: IntArray) -> BoolArray:
             return state.sitting_time[rows] <= 0.0
         case Wait.PLAYED:
             return state.play_clip[rows] < 0
-        case Wait.GIVER_NEAR | Wait.TAKER_READY | Wait.OFFERED:
+        case Wait.GIVER_NEAR | Wait.TAKER_THERE | Wait.TAKER_READY | Wait.OFFERED:
             other = tasks.lists.target[rows, tasks.index[rows]]
             return np.array(
                 [_is_met(wait, tasks, int(row), int(o)) for row, o in zip(rows, other, strict=True)]
@@ -166,9 +181,11 @@ def _all_hands(is_so: BoolArray, hands: BoolArray) -> BoolArray:
 def _is_met(wait: Wait, tasks: Tasks, row: int, other: int) -> bool:
     """Two people who hand something over wait for each other."""
     state = tasks.simulation.state
+    if wait is Wait.TAKER_THERE:
+        return does(tasks, other, TaskKind.TAKE_FROM, row)
     near = float(np.linalg.norm(state.position_world[row] - state.position_world[other])) < MEETING_NEAR
     if wait is Wait.GIVER_NEAR:
-        return near and tasks.wait[other] in (Wait.SETTLED, Wait.STANDING, Wait.TAKER_READY)
+        return near and tasks.wait[other] in (Wait.SETTLED, Wait.STANDING, Wait.TAKER_READY, Wait.TAKEN)
     if wait is Wait.TAKER_READY:
         return near and tasks.wait[other] == Wait.OFFERED
     return near and tasks.wait[other] == Wait.TAKEN and bool((state.reach_stage[other] == HOLD).any())

@@ -197,6 +197,49 @@ def test_what_is_too_big_for_one_hand_is_carried_and_handed_over_with_both(tmp_p
     assert figures["placed.error_mm.max"] < 2.0
 
 
+DESK = 'name = "desk", x = [2.4, 4.0], z = [-1.1, -0.55], height = 0.74, boards = [0.74] }},\n    {{ '
+
+
+@pytest.mark.parametrize(("thing", "place", "desk"), [
+    ("can_1", 0.0, ""), ("can_1", 2.0, DESK), ("carton", 0.0, ""),
+])  # fmt: skip
+def test_who_sits_takes_what_others_give_and_stands_up_for_what_needs_both_hands(
+    tmp_path, thing, place, desk
+):
+    people = person("ann", 0.0, 0.0, f'{{ pick_up = "{thing}" }}, {{ hand_over = "ben" }}')
+    people += person("ben", place, 1.0, '{ sit = "stool" }, { take_from = "ann" }, { wait = 0.5 }')
+    path = tmp_path / "room.toml"
+    room = ROOM.replace('name = "stool"', desk + 'name = "stool"').format(people=people + CARTON)
+    path.write_text(room, encoding="utf-8")
+    simulation = crowd.Simulation(crowd.load_scenario(path), threads=1)
+    item = simulation.model.objects.index(thing)
+    seat = None
+    for _ in simulation.run(seconds=90.0):
+        if simulation.state.is_seated[1]:
+            seat = simulation.state.position_world[1].copy() if seat is None else seat
+        if simulation.is_finished:
+            break
+    assert sorted(done(simulation)) == ["hand_over", "pick_up", "sit", "take_from", "wait"]
+    assert {event.kind for event in simulation.events} == {EventKind.TASK_DONE, EventKind.OBJECT_TAKEN}
+    assert simulation.objects.holder[item] == 1
+    assert simulation.state.is_seated[1] == (thing == "can_1")
+    assert np.linalg.norm(simulation.state.position_world[1] - seat) < 0.05
+    assert simulation.metrics.as_dict()["reach.finger_depth_mm.max"] < 1.0
+
+
+def test_nobody_is_pushed_off_a_seat(tmp_path):
+    people = person("ann", 3.0, -3.0, "{ wait = 9 }, { walk_to = [3.3, 3.0] }")
+    simulation = scene(tmp_path, people + person("ben", 2.0, 1.0, '{ sit = "stool" }, { wait = 12 }'))
+    places = []
+    for _ in simulation.run(seconds=25.0):
+        if simulation.state.is_seated[1]:
+            places.append(simulation.state.position_world[1].copy())
+        if simulation.is_finished:
+            break
+    assert len(places) > 300
+    assert np.ptp(places, axis=0).max() < 0.02
+
+
 def test_what_is_held_already_is_picked_up_at_once(tmp_path):
     tasks = (
         '{ pick_up = "can_1", hand = "right" }, { pick_up = "can_1" }, { pick_up = "can_1", hand = "left" }'
