@@ -20,7 +20,6 @@ import numpy as np
 from crowd_kernels._jit import kernel, parallel_kernel, prange
 from crowd_kernels.ik_effector import effector_row
 from crowd_kernels.ik_gather import FAR, gather_effectors, gather_joints
-from crowd_kernels.ik_joint import commit_row
 from crowd_kernels.ik_lanes import add_row, running_row, sum_row
 from crowd_kernels.ik_layout import (
     ANGLE,
@@ -240,9 +239,6 @@ def solve_block(
             if sum_row(error) == ZERO:
                 break
         pull *= np.float32(settings.pull_fade)
-        for k in range(tree.joint.shape[0]):
-            if tree.weight[k] > ZERO:
-                commit_row(joints[k + 1])
         if root_weight > ZERO:
             for e in range(count):
                 root_push_row(effectors[e], push[e], root_weight, joints[0])
@@ -307,12 +303,13 @@ def solve_chunk(
     effector_count = tree.effector.shape[0]
     effector_begin = (joint_count + 1) * JOINT_ROW
     system_begin = effector_begin + effector_count * EFFECTOR_ROW
-    push_begin = system_begin + effector_count * (2 * effector_count + 1) * BLOCK
+    blocks = effector_count * (2 * effector_count + 1)
+    push_begin = system_begin + blocks * BLOCK
     scale_begin = push_begin + effector_count * 6 * LANES
     control_begin = scale_begin + segment_scale.shape[1] * LANES
     joints = scratch[:effector_begin].reshape(joint_count + 1, JOINT_ROW)
     effectors = scratch[effector_begin:system_begin].reshape(effector_count, EFFECTOR_ROW)
-    system = scratch[system_begin:push_begin].reshape(effector_count * (2 * effector_count + 1), BLOCK)
+    system = scratch[system_begin:push_begin].reshape(blocks, BLOCK)
     push = scratch[push_begin:scale_begin].reshape(effector_count, PUSH)
     scale = scratch[scale_begin:control_begin]
     control = scratch[control_begin : control_begin + 6 * LANES]

@@ -13,7 +13,6 @@ from crowd_kernels.ik_layout import (
     PLACE,
     POINT,
     REFERENCE,
-    ROTATION,
     TARGET,
     TARGET_FRAME,
     WANTS_FRAME,
@@ -147,7 +146,7 @@ def gather_joints(
     out_scale : (G * 16,) float32
         Written.
     out_joints : (K + 1, JOINT_ROW) float32
-        Written.
+        Written: the pose as next rotations.
 
     Notes
     -----
@@ -168,9 +167,9 @@ def gather_joints(
             begin = tree.joint[k] * tree.joint_step
             for component in range(4):
                 index = begin + component * tree.component_step
-                out_joints[k + 1, ROTATION + component * LANES + lane] = pose[index]
+                out_joints[k + 1, NEXT + component * LANES + lane] = pose[index]
                 out_joints[k + 1, REFERENCE + component * LANES + lane] = reference[index]
-                out_joints[k + 1, NEXT + component * LANES + lane] = last[index]
+                out_joints[k + 1, FRAME + component * LANES + lane] = last[index]
     out_joints[0, FRAME : FRAME + LANES] = ONE
     out_joints[0, FRAME + LANES : FRAME + 4 * LANES] = ZERO
     for k in range(tree.joint.shape[0]):

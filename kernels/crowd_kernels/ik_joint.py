@@ -45,17 +45,21 @@ def moved(row: Any, lane: int, torque: Vector) -> Vector:
 
 
 @inlined_kernel
-def mobility_at(joint: Any, lane: int) -> tuple[Vector, Vector, Vector]:
-    """Read the rows of a joint's mobility."""
+def lost_mobility_at(joint: Any, weight: Any, lane: int) -> tuple[Vector, Vector, Vector]:
+    """Find the rows of what a joint's mobility lacks of its weight in every direction."""
     first = MOBILITY + lane
-    xx, xy, xz = joint[first], joint[first + LANES], joint[first + 2 * LANES]
-    yy, yz, zz = joint[first + 3 * LANES], joint[first + 4 * LANES], joint[first + 5 * LANES]
+    xx, xy, xz = weight - joint[first], -joint[first + LANES], -joint[first + 2 * LANES]
+    yy, yz, zz = (
+        weight - joint[first + 3 * LANES],
+        -joint[first + 4 * LANES],
+        weight - joint[first + 5 * LANES],
+    )
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
 @inlined_kernel
 def forward_row(above: Any, scale: Any, x: Any, y: Any, z: Any, row: Any) -> None:
-    """Place a joint below its parent.
+    """Let a joint's next rotation be its rotation, and place it below its parent.
 
     Parameters
     ----------
@@ -66,14 +70,16 @@ def forward_row(above: Any, scale: Any, x: Any, y: Any, z: Any, row: Any) -> Non
     x, y, z : float32
         Rest offset in the parent's frame, m.
     row : (JOINT_ROW,) float32
-        The joint: place and frame are written.
+        The joint: rotation, place and frame are written.
     """
     for lane in range(LANES):
+        rotation = quaternion_at(row, NEXT, lane)
+        put_quaternion(row, ROTATION, lane, rotation)
         outer = quaternion_at(above, FRAME, lane)
         ahead = rotate(outer, (x * scale[lane], y * scale[lane], z * scale[lane]))
         base = vector_at(above, PLACE, lane)
         put_vector(row, PLACE, lane, (base[0] + ahead[0], base[1] + ahead[1], base[2] + ahead[2]))
-        put_quaternion(row, FRAME, lane, multiply(outer, quaternion_at(row, ROTATION, lane)))
+        put_quaternion(row, FRAME, lane, multiply(outer, rotation))
 
 
 @inlined_kernel
@@ -178,17 +184,3 @@ def free_step_row(above: Any, weight: Any, is_running: Any, row: Any) -> None:
         torque = vector_at(row, STEP, lane)
         turn = (weight * torque[0], weight * torque[1], weight * torque[2])
         put_step(above, turn, is_running[lane], lane, row)
-
-
-@inlined_kernel
-def commit_row(row: Any) -> None:
-    """Let a joint's next rotation be its rotation.
-
-    Parameters
-    ----------
-    row : (JOINT_ROW,) float32
-        The joint.
-    """
-    # One long loop: short ones are unrolled and stay scalar.
-    for index in range(4 * LANES):
-        row[ROTATION + index] = row[NEXT + index]

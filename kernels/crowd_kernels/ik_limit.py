@@ -128,10 +128,10 @@ def hold_reference_row(
     low, high : float32
         See `LimitArrays.twist`.
     row : (JOINT_ROW,) float32
-        The joint, with the last pose's rotation as its next: bounds, held and last values are written.
+        The joint, with the last pose's rotation as its frame: bounds, held and last values are written.
     """
     for lane in range(LANES):
-        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
+        x, y, twist = split(into_limit(parent_frame, quaternion_at(row, FRAME, lane), joint_frame))
         row[LAST + lane] = np.sqrt(x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y)
         row[LAST + LANES + lane] = twist
         x, y, twist = split(into_limit(parent_frame, quaternion_at(row, REFERENCE, lane), joint_frame))

@@ -5,17 +5,19 @@ from typing import Any
 import numpy as np
 
 from crowd_kernels._jit import kernel
-from crowd_kernels.ik_effector import (
-    accumulate_cross_row,
-    accumulate_frame_row,
-    accumulate_free_cross_row,
-    accumulate_free_frame_row,
-    accumulate_free_place_row,
-    accumulate_place_row,
-    add_torque_row,
-    start_push_row,
-    subtract_drift_row,
+from crowd_kernels.ik_accumulate import (
+    add_lever_row,
+    add_moments_row,
+    add_own_moments_row,
+    finish_cross_row,
+    finish_frame_row,
+    finish_place_row,
+    finish_push_row,
+    take_cross_row,
+    take_frame_row,
+    take_place_row,
 )
+from crowd_kernels.ik_effector import add_torque_row
 from crowd_kernels.ik_gather import frame_of
 from crowd_kernels.ik_joint import forward_row, free_step_row, pull_row, rest_row, step_row
 from crowd_kernels.ik_lanes import clear_row
@@ -36,7 +38,7 @@ from crowd_kernels.lanes import LANES
 
 @kernel
 def place_joints(tree: TreeArrays, scale: Any, joints: Any) -> None:
-    """Compute places and frames of all joints of a block.
+    """Take over the next rotations of all joints of a block, and compute places and frames.
 
     Parameters
     ----------
@@ -96,13 +98,61 @@ def free_joints(tree: TreeArrays, gain: Any, bound: Any, approach: Any, joints: 
 
 
 @kernel
-def add_joint(weight: Any, joint: Any, effectors: Any, a: int, b: int, parts: int, out_system: Any) -> None:
-    """Add a joint's share to the blocks of two effectors.
+def add_free_joints(
+    tree: TreeArrays, a: int, b: int, parts: int, joints: Any, effectors: Any, out_system: Any, out_push: Any
+) -> None:
+    """Make the blocks of two effectors as if all joints turned freely.
+
+    Parameters
+    ----------
+    a, b : int
+        Effectors of the blocks' rows and columns. Where both are the same, its right side is made too.
+    out_system : (E * parts * (E * parts + 1) / 2, 144) float32
+        Blocks of the lower triangle, 0 on entry: those of a and b are written.
+    out_push : (E, PUSH) float32
+        Right side, 0 on entry.
+
+    Notes
+    -----
+    All other arguments are those of `build_system`.
+    """
+    places = out_system[block_of(a * parts, b * parts)]
+    # The two blocks of a's rotation are neighbours.
+    first = block_of(2 * a + 1, 2 * b) if parts == 2 else 0
+    frames = out_system[first : first + parts].reshape(parts * BLOCK)
+    crossed = out_system[block_of(2 * a, 2 * b + 1) if parts == 2 and a != b else 0]
+    total = ZERO
+    for k in range(tree.joint.shape[0]):
+        if tree.moves[a, k] and tree.moves[b, k]:
+            weight, joint = tree.weight[k], joints[k + 1]
+            total += weight
+            if a == b:
+                add_own_moments_row(joint, weight, effectors[a], out_push[a], places)
+            else:
+                add_moments_row(joint, weight, effectors[a], effectors[b], places)
+            if parts == 2:
+                add_lever_row(joint, weight, effectors[b], frames)
+                if a != b:
+                    add_lever_row(joint, weight, effectors[a], crossed)
+    finish_place_row(effectors[a], effectors[b], places)
+    if a == b:
+        finish_push_row(effectors[a], out_push[a])
+    if parts == 2:
+        finish_frame_row(effectors[a], effectors[b], total, frames)
+        if a != b:
+            finish_cross_row(effectors[a], effectors[b], crossed)
+
+
+@kernel
+def take_fixed_joint(
+    weight: Any, joint: Any, effectors: Any, a: int, b: int, parts: int, out_system: Any
+) -> None:
+    """Take what a joint with fixed directions cannot do from the blocks of two effectors.
 
     Parameters
     ----------
     weight : float32
-        How easily the joint turns.
+        How easily the joint would turn freely.
     joint : (JOINT_ROW,) float32
     effectors : (E, EFFECTOR_ROW) float32
     a, b : int
@@ -112,28 +162,15 @@ def add_joint(weight: Any, joint: Any, effectors: Any, a: int, b: int, parts: in
     out_system : (E * parts * (E * parts + 1) / 2, 144) float32
         Blocks of the lower triangle, in and out.
     """
-    places = out_system[block_of(a * parts, b * parts)]
-    is_free = joint[IS_FIXED] == ZERO
-    if is_free:
-        accumulate_free_place_row(joint, weight, effectors[a], effectors[b], places)
-    else:
-        accumulate_place_row(joint, effectors[a], effectors[b], places)
+    take_place_row(joint, weight, effectors[a], effectors[b], out_system[block_of(a * parts, b * parts)])
     if parts == 1:
         return
-    # The two blocks of a's rotation are neighbours.
     first = block_of(2 * a + 1, 2 * b)
     frames = out_system[first : first + 2].reshape(2 * BLOCK)
-    if is_free:
-        accumulate_free_frame_row(joint, weight, effectors[a], effectors[b], frames)
-    else:
-        accumulate_frame_row(joint, effectors[a], effectors[b], frames)
-    if a == b:
-        return
-    cross = out_system[block_of(2 * a, 2 * b + 1)]
-    if is_free:
-        accumulate_free_cross_row(joint, weight, effectors[a], effectors[b], cross)
-    else:
-        accumulate_cross_row(joint, effectors[a], effectors[b], cross)
+    take_frame_row(joint, weight, effectors[a], effectors[b], frames)
+    if a != b:
+        crossed = out_system[block_of(2 * a, 2 * b + 1)]
+        take_cross_row(joint, weight, effectors[a], effectors[b], crossed)
 
 
 @kernel
@@ -157,24 +194,18 @@ def build_system(
     """
     root_weight = np.float32(tree.root_weight)
     out_system[:] = ZERO
+    out_push[:] = ZERO
     for a in range(tree.effector.shape[0]):
-        start_push_row(effectors[a], out_push[a])
+        for b in range(a + 1):
+            add_free_joints(tree, a, b, parts, joints, effectors, out_system, out_push)
+            for k in range(tree.joint.shape[0]):
+                if tree.moves[a, k] and tree.moves[b, k] and joints[k + 1, IS_FIXED] != ZERO:
+                    take_fixed_joint(tree.weight[k], joints[k + 1], effectors, a, b, parts, out_system)
+            if root_weight > ZERO:
+                places = out_system[block_of(a * parts, b * parts)]
+                root_accumulate_row(effectors[a], effectors[b], root_weight, places)
         if root_weight > ZERO:
             root_subtract_row(joints[0], effectors[a], out_push[a])
-        for k in range(tree.joint.shape[0]):
-            if tree.moves[a, k]:
-                subtract_drift_row(joints[k + 1], effectors[a], out_push[a])
-        for b in range(a + 1):
-            if root_weight > ZERO:
-                root_accumulate_row(
-                    effectors[a],
-                    effectors[b],
-                    root_weight,
-                    out_system[block_of(a * parts, b * parts)],
-                )
-            for k in range(tree.joint.shape[0]):
-                if tree.moves[a, k] and tree.moves[b, k]:
-                    add_joint(tree.weight[k], joints[k + 1], effectors, a, b, parts, out_system)
 
 
 @kernel

@@ -10,7 +10,18 @@ import numba
 import pytest
 from llvmlite import binding
 
-from crowd_kernels import _jit, clip, gaze_rows, ik_effector, ik_joint, ik_limit, ik_system, lanes, pose
+from crowd_kernels import (
+    _jit,
+    clip,
+    gaze_rows,
+    ik_accumulate,
+    ik_effector,
+    ik_joint,
+    ik_limit,
+    ik_system,
+    lanes,
+    pose,
+)
 
 FEATURES = binding.get_host_cpu_features()
 ROW = numba.float32[::1]
@@ -49,12 +60,16 @@ QUATERNION = numba.types.UniTuple(NUMBER, 4)
 ARITHMETIC_LEAVES |= {
     ik_joint.forward_row: (ROW, ROW, NUMBER, NUMBER, NUMBER, ROW),
     ik_joint.pull_row: (ROW, NUMBER, NUMBER, ROW),
-    ik_effector.subtract_drift_row: (ROW, ROW, ROW),
-    ik_effector.accumulate_place_row: (ROW, ROW, ROW, ROW),
-    ik_effector.accumulate_frame_row: (ROW, ROW, ROW, ROW),
-    ik_effector.accumulate_free_place_row: (ROW, NUMBER, ROW, ROW, ROW),
-    ik_effector.accumulate_free_frame_row: (ROW, NUMBER, ROW, ROW, ROW),
-    ik_effector.accumulate_free_cross_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_accumulate.add_own_moments_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_accumulate.add_moments_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_accumulate.add_lever_row: (ROW, NUMBER, ROW, ROW),
+    ik_accumulate.finish_push_row: (ROW, ROW),
+    ik_accumulate.finish_place_row: (ROW, ROW, ROW),
+    ik_accumulate.finish_frame_row: (ROW, ROW, NUMBER, ROW),
+    ik_accumulate.finish_cross_row: (ROW, ROW, ROW),
+    ik_accumulate.take_place_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_accumulate.take_frame_row: (ROW, NUMBER, ROW, ROW, ROW),
+    ik_accumulate.take_cross_row: (ROW, NUMBER, ROW, ROW, ROW),
     ik_effector.add_torque_row: (ROW, ROW, numba.boolean, ROW),
     ik_joint.step_row: (ROW, ROW, ROW),
     ik_joint.free_step_row: (ROW, NUMBER, ROW, ROW),
