@@ -331,13 +331,13 @@ def solve_chunk(
         )
         parts = gather_effectors(
             tree,
-            segment_scale,
             task,
             point,
             target_position,
             target_rotation,
             active,
             first,
+            scale,
             effectors,
         )
         for lane in range(LANES):

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import kernel
+from crowd_kernels._jit import inlined_kernel, kernel
 from crowd_kernels.ik_layout import (
     FRAME,
     LENGTH,
@@ -18,16 +18,19 @@ from crowd_kernels.ik_layout import (
     WANTS_FRAME,
     WANTS_PLACE,
     ZERO,
+    vector_at,
 )
 from crowd_kernels.ik_limit import hold_reference_row
 from crowd_kernels.ik_tree import TreeArrays
 from crowd_kernels.lanes import LANES
+from crowd_kernels.vector import dot
 
 POSITION = 1
 ROTATION_TOO = 2
 """Tasks of an effector: 1 position, 2 rotation, 3 both; 0 for none."""
 FAR: Any = np.float32(1e30)
-LEAST_LENGTH = 0.5
+LEAST_SQUARE: Any = np.float32(0.5)
+"""Rotations whose squared length is less than this, or more than its inverse, are none."""
 
 
 @kernel
@@ -37,30 +40,57 @@ def frame_of(frames: Any, k: int) -> tuple[Any, Any, Any, Any]:
 
 
 @kernel
-def is_sound(place: Any, frame: Any, point: Any, wants_place: bool, wants_frame: bool) -> bool:
+def is_sound(place: Any, square: Any, point: Any, wants_place: bool, wants_frame: bool) -> bool:
     """Tell whether a target can be sought: what is asked for is finite, and the rotation is one."""
-    total = float(point[0]) + float(point[1]) + float(point[2])
+    total = point[0] + point[1] + point[2]
     if wants_place:
-        total += float(place[0]) + float(place[1]) + float(place[2])
-    if wants_frame:
-        square = 0.0
-        for component in range(4):
-            square += float(frame[component]) * float(frame[component])
-        if not (square > LEAST_LENGTH and square < 1.0 / LEAST_LENGTH):
-            return False
+        total += place[0] + place[1] + place[2]
+    if wants_frame and not (square > LEAST_SQUARE and square < ONE / LEAST_SQUARE):
+        return False
     return bool(np.isfinite(total))
+
+
+@inlined_kernel
+def begin_length_row(row: Any) -> None:
+    """Begin the length of an effector's chain with the distance of the effector from its joint.
+
+    Parameters
+    ----------
+    row : (EFFECTOR_ROW,) float32
+        The effector: its length is written.
+    """
+    for lane in range(LANES):
+        point = vector_at(row, POINT, lane)
+        row[LENGTH + lane] = np.sqrt(dot(point, point))
+
+
+@inlined_kernel
+def add_length_row(offset: Any, scale: Any, row: Any) -> None:
+    """Lengthen the chain of an effector by the way from a joint's parent to the joint.
+
+    Parameters
+    ----------
+    offset : float32
+        Length of the joint's rest offset, m.
+    scale : (16,) float32
+        Proportions of its segment.
+    row : (EFFECTOR_ROW,) float32
+        The effector: its length is changed.
+    """
+    for lane in range(LANES):
+        row[LENGTH + lane] += offset * scale[lane]
 
 
 @kernel
 def gather_effectors(
     tree: TreeArrays,
-    segment_scale: Any,
     task: Any,
     point: Any,
     target_position: Any,
     target_rotation: Any,
     active: Any,
     first: int,
+    scale: Any,
     out_effectors: Any,
 ) -> int:
     """Read the targets of 16 active characters.
@@ -69,6 +99,8 @@ def gather_effectors(
     ----------
     first : int
         Place in `active` of the first lane.
+    scale : (G * 16,) float32
+        Their proportions.
     out_effectors : (E, EFFECTOR_ROW) float32
         Written.
 
@@ -88,40 +120,48 @@ def gather_effectors(
         row = out_effectors[e]
         for lane in range(LANES):
             character = active[min(first + lane, count - 1)]
-            wants_place = (task[character, column] & POSITION) != 0
-            wants_frame = (task[character, column] & ROTATION_TOO) != 0
+            asked = task[character, column]
             place = target_position[character, column]
             frame = target_rotation[character, column]
-            if not is_sound(place, frame, point[character, column], wants_place, wants_frame):
-                wants_place = False
-                wants_frame = False
-            if wants_frame:
-                parts = 2
+            own_point = point[character, column]
+            square = frame[0] * frame[0] + frame[1] * frame[1] + frame[2] * frame[2] + frame[3] * frame[3]
+            if not is_sound(place, square, own_point, (asked & POSITION) != 0, (asked & ROTATION_TOO) != 0):
+                asked = 0
+            wants_place, wants_frame = (asked & POSITION) != 0, (asked & ROTATION_TOO) != 0
             row[WANTS_PLACE + lane] = ONE if wants_place else ZERO
             row[WANTS_FRAME + lane] = ONE if wants_frame else ZERO
-            square = 0.0
+            inverse = ONE / np.sqrt(square)
             for component in range(4):
-                square += float(frame[component]) * float(frame[component])
-            for component in range(4):
-                own = frame[component] / np.sqrt(square) if wants_frame else (1.0 if component == 0 else 0.0)
-                row[TARGET_FRAME + component * LANES + lane] = own
-            is_wanted = wants_place or wants_frame
-            length: Any = 0.0
+                rest = ONE if component == 0 else ZERO
+                row[TARGET_FRAME + component * LANES + lane] = (
+                    frame[component] * inverse if wants_frame else rest
+                )
             for axis in range(3):
-                own = point[character, column, axis] if is_wanted else ZERO
-                row[POINT + axis * LANES + lane] = own
-                length += own * own
+                row[POINT + axis * LANES + lane] = own_point[axis] if asked != 0 else ZERO
                 row[TARGET + axis * LANES + lane] = place[axis] if wants_place else ZERO
-            row[LENGTH + lane] = np.sqrt(length) if tree.root_weight == 0.0 else FAR
+            if wants_frame:
+                parts = 2
+        if tree.root_weight > 0.0:
+            row[LENGTH : LENGTH + LANES] = FAR
+            continue
+        begin_length_row(row)
         k = tree.effector[e]
         while k >= 0 and k != tree.base[e]:
             x, y, z = tree.offset[k, 0], tree.offset[k, 1], tree.offset[k, 2]
-            own = np.sqrt(x * x + y * y + z * z)
-            for lane in range(LANES):
-                character = active[min(first + lane, count - 1)]
-                row[LENGTH + lane] += own * segment_scale[character, tree.segment[k]]
+            part = tree.segment[k] * LANES
+            add_length_row(np.sqrt(x * x + y * y + z * z), scale[part : part + LANES], row)
             k = tree.parent[k]
     return parts
+
+
+@kernel
+def gather_rotation(tree: TreeArrays, k: int, pose: Any, begin: int, lane: int, out_joint: Any) -> None:
+    """Read the rotation of the tree's joint k from a pose row to one lane of a joint's row."""
+    index, step, place = tree.joint[k] * tree.joint_step, tree.component_step, begin + lane
+    out_joint[place] = pose[index]
+    out_joint[place + LANES] = pose[index + step]
+    out_joint[place + 2 * LANES] = pose[index + 2 * step]
+    out_joint[place + 3 * LANES] = pose[index + 3 * step]
 
 
 @kernel
@@ -160,16 +200,13 @@ def gather_joints(
         scale = segment_scale[character, tree.root_segment]
         for axis in range(3):
             out_joints[0, PLACE + axis * LANES + lane] = root_position[character, axis] * scale
-        pose = pose_rotation[character]
-        reference = reference_rotation[character]
-        last = last_rotation[character]
         for k in range(tree.joint.shape[0]):
-            begin = tree.joint[k] * tree.joint_step
-            for component in range(4):
-                index = begin + component * tree.component_step
-                out_joints[k + 1, NEXT + component * LANES + lane] = pose[index]
-                out_joints[k + 1, REFERENCE + component * LANES + lane] = reference[index]
-                out_joints[k + 1, FRAME + component * LANES + lane] = last[index]
+            joint = out_joints[k + 1]
+            gather_rotation(tree, k, pose_rotation[character], NEXT, lane, joint)
+            if tree.weight[k] > ZERO:
+                gather_rotation(tree, k, reference_rotation[character], REFERENCE, lane, joint)
+            if tree.is_limited[k]:
+                gather_rotation(tree, k, last_rotation[character], FRAME, lane, joint)
     out_joints[0, FRAME : FRAME + LANES] = ONE
     out_joints[0, FRAME + LANES : FRAME + 4 * LANES] = ZERO
     for k in range(tree.joint.shape[0]):
