@@ -2,11 +2,14 @@
 
 import base64
 import io
+import math
+import re
 
 import numpy as np
 import pytest
 
 import crowd
+from crowd.errors import CrowdError
 from crowd.recording import Recorder
 
 
@@ -36,4 +39,36 @@ def test_a_clip_of_a_run_and_of_a_recording_is_a_video_in_the_page(drawing, tmp_
             recorder.record(simulation.step())
     with crowd.Recording(tmp_path / "run.h5") as recording:
         drawing.clip(recording, seconds=0.4, start=0.7, size=(160, 96)).write(tmp_path / "part.mp4")
+        for how, what in (
+            ({"seconds": math.nan}, "clip: seconds are out of range; got nan; allowed 0 to 86400 s"),
+            ({"start": math.nan}, "video: start is not a number; got nan; allowed a time, s"),
+            ({"frames_per_second": 0.0}, ".mp4: frames_per_second are out of range; got 0.0; allowed > 0 Hz"),
+        ):
+            with pytest.raises(CrowdError, match=re.escape(what)):
+                drawing.clip(recording, size=(160, 96), **how)
     assert imageio.imread(tmp_path / "part.mp4").shape == (13, 96, 160, 3)
+
+
+@pytest.mark.parametrize("seconds", [0, 0.0, 0.004])
+def test_a_clip_without_a_frame_is_one_line(drawing, walkers, seconds):
+    before = walkers.time
+    with pytest.raises(CrowdError) as caught:
+        drawing.clip(walkers, seconds=seconds, size=(160, 96))
+    what = "clip: is shorter than a step: there is no frame to show"
+    assert str(caught.value) == f"{what}; got '{seconds:g} s'; allowed >= 0.0166667 s"
+    assert walkers.time == before
+
+
+def test_a_film_without_a_frame_leaves_no_file(drawing, walkers, tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    from crowd_viewer.video import Film, VideoWriter
+
+    path = tmp_path / "film.mp4"
+    film = Film(path, walkers, size=(160, 96))
+    with pytest.raises(CrowdError, match=re.escape(f"{path}: is not written: there is no frame to show")):
+        film.close()
+    with pytest.raises(CrowdError, match="there is no frame to show"), VideoWriter(path):
+        pass
+    with pytest.raises(KeyError), VideoWriter(path):
+        raise KeyError
+    assert not list(tmp_path.iterdir())

@@ -7,6 +7,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from crowd.arguments import checked_seconds
+from crowd.errors import SettingsError, describe
 from crowd.simulation import Simulation
 from crowd_viewer.camera import Camera
 from crowd_viewer.frame import Shown, opened
@@ -79,8 +81,14 @@ def clip(
     ------
     ViewerError
         There is no OpenGL or no encoder; the message says what to install.
+    SettingsError
+        It is no time, or shorter than a step of the simulation.
     """
     source = opened(shown)
+    seconds = checked_seconds("clip", seconds)
+    if isinstance(source, Simulation) and round(seconds / source.dt) < 1:
+        what = "is shorter than a step: there is no frame to show"
+        raise SettingsError(describe("clip", what, f"{seconds:g} s", f">= {source.dt:g} s"))
     with tempfile.TemporaryDirectory(prefix="crowd-") as folder:
         path = Path(folder) / "clip.mp4"
         if isinstance(source, Simulation):

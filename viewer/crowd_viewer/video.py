@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -9,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from crowd.errors import describe
+from crowd.arguments import number
+from crowd.errors import SettingsError, describe
 from crowd.recording import Recording
 from crowd_viewer.camera import Camera
 from crowd_viewer.context import INSTALL, ViewerError, headless_context
@@ -58,7 +60,7 @@ class VideoWriter:
     Raises
     ------
     ViewerError
-        There is no encoder, or the size is odd.
+        There is no encoder, the size is odd, or the rate is none.
     """
 
     def __init__(
@@ -67,6 +69,9 @@ class VideoWriter:
         encoder = require_encoder(path)
         if size[0] % 2 or size[1] % 2:
             raise ViewerError(describe(str(path), "width and height of a video are even", size))
+        if not 0.0 < number(str(path), "frames_per_second", frames_per_second, "> 0 Hz") < math.inf:
+            what = "frames_per_second are out of range"
+            raise ViewerError(describe(str(path), what, frames_per_second, "> 0 Hz"))
         self.path = path
         presets = [] if path.suffix.lower() == ".webm" else ["-preset", "veryfast"]
         self._process = encoder.write_frames(
@@ -79,7 +84,7 @@ class VideoWriter:
             output_params=["-crf", "20", *presets],
             ffmpeg_log_level="error",
         )
-        self._process.send(None)
+        self._has_begun = False
 
     def write(self, picture: npt.NDArray[np.uint8]) -> None:
         """Append a picture.
@@ -90,6 +95,10 @@ class VideoWriter:
             The encoder has stopped, for example because the disk is full.
         """
         try:
+            if not self._has_begun:
+                # The encoder makes the file as soon as it runs: one without pictures would be unreadable.
+                self._process.send(None)
+                self._has_begun = True
             self._process.send(np.ascontiguousarray(picture))
         except (OSError, StopIteration) as error:
             raise ViewerError(
@@ -97,8 +106,16 @@ class VideoWriter:
             ) from error
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the file.
+
+        Raises
+        ------
+        ViewerError
+            There was no picture, so there is no file.
+        """
         self._process.close()
+        if not self._has_begun:
+            raise ViewerError(describe(str(self.path), "is not written: there is no frame to show"))
 
     def __enter__(self) -> Self:
         return self
@@ -106,7 +123,8 @@ class VideoWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if error is None or self._has_begun:
+            self.close()
 
 
 class Film:
@@ -154,9 +172,15 @@ class Film:
             self._written = due
 
     def close(self) -> None:
-        """Finish the file."""
-        self._writer.close()
+        """Finish the file.
+
+        Raises
+        ------
+        ViewerError
+            No frame was recorded, so there is no file.
+        """
         self._renderer.release()
+        self._writer.close()
 
 
 def film_recording(
@@ -176,21 +200,26 @@ def film_recording(
     ------
     ViewerError
         The recording is empty, or has nothing between these times.
+    SettingsError
+        A time is no number.
     """
     source = ReplaySource(recording)
     # A recording that was cut short simply ends earlier.
     first, last = float(recording.time[0]), float(recording.time[-1])
+    for name, moment in (("start", start), ("stop", stop)):
+        if moment is not None and math.isnan(number("video", name, moment, "a time, s")):
+            raise SettingsError(describe("video", f"{name} is not a number", moment, "a time, s"))
     begin, end = max(first, first if start is None else start), min(last, last if stop is None else stop)
     if end < begin:
         got = f"{first if start is None else start:g} to {last if stop is None else stop:g} s"
         allowed = f"{first:.2f} to {last:.2f} s"
         raise ViewerError(describe(str(recording.path), "has no such time", got, allowed))
-    times = np.arange(begin, end + 1e-6, 1.0 / frames_per_second)
     chosen = camera or default_camera(source.scene, source.places(begin, end), size)
     with (
         VideoWriter(path, size, frames_per_second) as writer,
         Renderer(headless_context(), source.scene, size, quality) as renderer,
     ):
+        times = np.arange(begin, end + 1e-6, 1.0 / frames_per_second)
         for time in times:
             renderer.draw(source.frame(float(time)), chosen)
             writer.write(renderer.picture())
