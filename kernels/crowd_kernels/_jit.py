@@ -17,8 +17,9 @@ import hashlib
 import os
 import threading
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
+from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import numba
@@ -28,6 +29,9 @@ R = TypeVar("R")
 
 PACKAGE_FOLDER = Path(__file__).parent
 PACKAGE_NAME = PACKAGE_FOLDER.name
+IS_THREADED = True
+"""Chunks of a parallel kernel run at the same time, so that each needs its own scratch row. In the serial
+build all take the first row, which stays in the cache."""
 CHECKS_BOUNDS = os.environ.get("NUMBA_BOUNDSCHECK", "0") != "0"
 
 # Numba falls back to a threading layer that aborts when two threads launch at once.
@@ -97,6 +101,20 @@ def _compile(function: Callable[P, R], *, parallel: bool = False, is_inlined: bo
     return cast("Callable[P, R]", compiled)
 
 
+def _with_globals(function: Callable[P, R], **values: bool) -> Callable[P, R]:
+    """Copy a function that sees other values of some globals of its module."""
+    assert isinstance(function, FunctionType)
+    copy = FunctionType(
+        function.__code__, function.__globals__ | values, function.__name__, None, function.__closure__
+    )
+    copy.__module__, copy.__qualname__, copy.__doc__ = (
+        function.__module__,
+        function.__qualname__,
+        function.__doc__,
+    )
+    return cast("Callable[P, R]", copy)
+
+
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a serial kernel: strict arithmetic, NumPy's error model, cached on disk."""
     return _compile(function)
@@ -114,7 +132,7 @@ class ParallelKernel(Generic[P, R]):
     """A driver with a loop over chunks, in a serial and a threaded build that give equal bits.
 
     Calling it runs the threaded build, or the serial one when Numba is set to a single thread. Each build is
-    compiled when it is first called.
+    compiled when it is first called, with its own value of the global `IS_THREADED`.
     """
 
     def __init__(self, function: Callable[P, R]) -> None:
@@ -122,8 +140,16 @@ class ParallelKernel(Generic[P, R]):
         self.__name__ = function.__name__
         self.__module__ = function.__module__
         self.__wrapped__ = function
-        self.serial: Callable[P, R] = _compile(function)
-        self.threaded: Callable[P, R] = _compile(function, parallel=True)
+
+    @cached_property
+    def serial(self) -> Callable[P, R]:
+        """The build in which one chunk follows another."""
+        return _compile(_with_globals(self.__wrapped__, IS_THREADED=False))
+
+    @cached_property
+    def threaded(self) -> Callable[P, R]:
+        """The build in which chunks run at the same time."""
+        return _compile(_with_globals(self.__wrapped__, IS_THREADED=True), parallel=True)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         if numba.get_num_threads() == 1:

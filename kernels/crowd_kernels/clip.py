@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
+from crowd_kernels._jit import IS_THREADED, inlined_kernel, kernel, parallel_kernel, prange
 
 CHUNKS = 32
 PADDED_JOINTS = 64
@@ -272,5 +272,5 @@ def blend_samples(
             pelvis_mask,
             pose_rotation,
             pose_pelvis,
-            scratch[chunk],
+            scratch[chunk if IS_THREADED else 0],
         )

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
+from crowd_kernels._jit import IS_THREADED, inlined_kernel, kernel, parallel_kernel, prange
 from crowd_kernels.gaze_chain import (
     GazeArrays,
     GazeLimits,
@@ -280,7 +280,7 @@ def gaze_crowd(
             dt,
             chunk * block_count // CHUNKS,
             (chunk + 1) * block_count // CHUNKS,
-            scratch[chunk],
+            scratch[chunk if IS_THREADED else 0],
             pose_rotation,
             pose_pelvis,
             turn,

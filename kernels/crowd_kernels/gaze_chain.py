@@ -35,10 +35,8 @@ from crowd_kernels.gaze_rows import (
     excess_row,
     look_back_row,
     settle_row,
-    step_down_row,
     swing_row,
     turn_eye_row,
-    turn_frame_row,
 )
 from crowd_kernels.lanes import LANES
 from crowd_kernels.polynomial import ONE, ZERO, sine_cosine
@@ -306,10 +304,12 @@ def turn_block(arrays: GazeArrays, limits: GazeLimits, dt: float, carry: Any, ey
         pelvis[component] = carry[component]
     for place in range(count):
         row = joints[place * JOINT_ROW : (place + 1) * JOINT_ROW]
-        step_down_row(row, carry, arrays.offset[place, 0], arrays.offset[place, 1], arrays.offset[place, 2])
         aim_joint_row(
             row,
             carry,
+            arrays.offset[place, 0],
+            arrays.offset[place, 1],
+            arrays.offset[place, 2],
             arrays.limit[place, 0],
             arrays.limit[place, 1],
             arrays.limit[place, 2],
@@ -317,7 +317,6 @@ def turn_block(arrays: GazeArrays, limits: GazeLimits, dt: float, carry: Any, ey
             arrays.bias[place, 1],
             arrays.bias[place, 2],
         )
-        turn_frame_row(row, carry)
     excess_row(eye_x, eye_y, eye_z, eyes, limits.eye_pitch, limits.eye_heading, carry)
     for place in range(count):
         decay = np.float32(math.exp(-arrays.rate[place] * dt))
@@ -326,8 +325,14 @@ def turn_block(arrays: GazeArrays, limits: GazeLimits, dt: float, carry: Any, ey
         carry[component] = pelvis[component]
     for place in range(count):
         row = joints[place * JOINT_ROW : (place + 1) * JOINT_ROW]
-        settle_row(row, carry, limits.head_speed)
-        step_down_row(row, carry, arrays.offset[place, 0], arrays.offset[place, 1], arrays.offset[place, 2])
+        settle_row(
+            row,
+            carry,
+            arrays.offset[place, 0],
+            arrays.offset[place, 1],
+            arrays.offset[place, 2],
+            limits.head_speed,
+        )
     for side in range(2):
         eye = eyes[side * EYE_ROW : (side + 1) * EYE_ROW]
         aim_eye_row(

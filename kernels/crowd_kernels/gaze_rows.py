@@ -10,7 +10,7 @@ import numpy as np
 
 from crowd_kernels._jit import inlined_kernel
 from crowd_kernels.lanes import LANES
-from crowd_kernels.polynomial import HALF, ONE, PI, TWO, ZERO, arc_tangent, sine_cosine
+from crowd_kernels.polynomial import HALF, ONE, PI, TWO, ZERO, acute_sine_cosine, arc_tangent, sine_cosine
 
 ROTATION, TURN, RATE, WANTED, AHEAD, EYE = 0, 64, 112, 160, 208, 256
 SHARE, SCALE, JOINT_ROW = 304, 320, 336
@@ -56,18 +56,18 @@ def rotated(w: Any, x: Any, y: Any, z: Any, vx: Any, vy: Any, vz: Any) -> Any:
 
 @inlined_kernel
 def exponential(x: Any, y: Any, z: Any) -> Any:
-    """Turn a rotation vector into a unit quaternion."""
+    """Turn a rotation vector of at most half a turn into a unit quaternion."""
     angle = np.sqrt(x * x + y * y + z * z + TINY)
-    sine, cosine = sine_cosine(HALF * angle)
+    sine, cosine = acute_sine_cosine(HALF * angle)
     scale = sine / angle
     return cosine, x * scale, y * scale, z * scale
 
 
 @inlined_kernel
-def within_ellipse(pitch: Any, heading: Any, pitch_limit: Any, heading_limit: Any) -> Any:
-    """Find the factor that brings a turn into the ellipse of its limits, at most 1."""
-    p = pitch / pitch_limit
-    h = heading / heading_limit
+def within_ellipse(pitch: Any, heading: Any, inverse_pitch: Any, inverse_heading: Any) -> Any:
+    """Find the factor that brings a turn into the ellipse of its limits, given inverse, at most 1."""
+    p = pitch * inverse_pitch
+    h = heading * inverse_heading
     return ONE / np.sqrt(max(p * p + h * h, ONE))
 
 
@@ -182,51 +182,37 @@ def begin_row(pelvis: Any, carry: Any, frequency: Any, decay: Any, dt: Any) -> N
 
 
 @inlined_kernel
-def step_down_row(row: Any, carry: Any, x: Any, y: Any, z: Any) -> None:
-    """Move the carried frame from the joint above to this one, in the pose of the layers below."""
-    for lane in range(LANES):
-        scale = row[SCALE + lane]
-        w = carry[ROTATION + lane]
-        i = carry[ROTATION + LANES + lane]
-        j = carry[ROTATION + 2 * LANES + lane]
-        k = carry[ROTATION + 3 * LANES + lane]
-        ox, oy, oz = rotated(w, i, j, k, x * scale, y * scale, z * scale)
-        carry[POSITION + lane] += ox
-        carry[POSITION + LANES + lane] += oy
-        carry[POSITION + 2 * LANES + lane] += oz
-        w, i, j, k = product(
-            w, i, j, k,
-            row[ROTATION + lane], row[ROTATION + LANES + lane],
-            row[ROTATION + 2 * LANES + lane], row[ROTATION + 3 * LANES + lane],
-        )  # fmt: skip
-        carry[ROTATION + lane] = w
-        carry[ROTATION + LANES + lane] = i
-        carry[ROTATION + 2 * LANES + lane] = j
-        carry[ROTATION + 3 * LANES + lane] = k
+def frame_below(row: Any, carry: Any, x: Any, y: Any, z: Any, lane: int) -> Any:
+    """Find rotation and position of a joint below the carried frame, in the pose of the layers below."""
+    scale = row[SCALE + lane]
+    w = carry[ROTATION + lane]
+    i = carry[ROTATION + LANES + lane]
+    j = carry[ROTATION + 2 * LANES + lane]
+    k = carry[ROTATION + 3 * LANES + lane]
+    ox, oy, oz = rotated(w, i, j, k, x * scale, y * scale, z * scale)
+    rotation = product(
+        w, i, j, k,
+        row[ROTATION + lane], row[ROTATION + LANES + lane],
+        row[ROTATION + 2 * LANES + lane], row[ROTATION + 3 * LANES + lane],
+    )  # fmt: skip
+    px, py, pz = (carry[POSITION + lane], carry[POSITION + LANES + lane], carry[POSITION + 2 * LANES + lane])
+    return rotation, (px + ox, py + oy, pz + oz)
 
 
 @inlined_kernel
-def turn_frame_row(row: Any, carry: Any) -> None:
-    """Turn the carried frame by the turn that is wanted of the joint."""
-    for lane in range(LANES):
-        a, b, c, d = exponential(
-            row[WANTED + lane], row[WANTED + LANES + lane], row[WANTED + 2 * LANES + lane]
-        )
-        w, i, j, k = product(
-            carry[ROTATION + lane], carry[ROTATION + LANES + lane],
-            carry[ROTATION + 2 * LANES + lane], carry[ROTATION + 3 * LANES + lane],
-            a, b, c, d,
-        )  # fmt: skip
-        carry[ROTATION + lane] = w
-        carry[ROTATION + LANES + lane] = i
-        carry[ROTATION + 2 * LANES + lane] = j
-        carry[ROTATION + 3 * LANES + lane] = k
+def put_frame(rotation: Any, position: Any, carry: Any, lane: int) -> None:
+    """Write the carried frame of one lane."""
+    for component in range(4):
+        carry[ROTATION + component * LANES + lane] = rotation[component]
+    for axis in range(3):
+        carry[POSITION + axis * LANES + lane] = position[axis]
 
 
 @inlined_kernel
 def aim_joint_row(
-    row: Any, carry: Any, pitch: Any, heading: Any, roll: Any, bias_x: Any, bias_y: Any, bias_z: Any
-) -> None:
+    row: Any, carry: Any, x: Any, y: Any, z: Any, pitch: Any, heading: Any, roll: Any,
+    bias_x: Any, bias_y: Any, bias_z: Any,
+) -> None:  # fmt: skip
     """Find a joint's part of the turn by which the head misses the target, within the joint's limits.
 
     Parameters
@@ -234,7 +220,9 @@ def aim_joint_row(
     row : (JOINT_ROW,) float32
         The joint; `WANTED` is written: a rotation vector in its frame, rad.
     carry : (CARRY_ROW,) float32
-        The joint's frame before its turn; target.
+        Target; frame of the joint above, replaced by the joint's with the turn that is wanted.
+    x, y, z : float32
+        Rest offset, m.
     pitch, heading, roll : float32
         Limits, rad.
     bias_x, bias_y, bias_z : float32
@@ -246,20 +234,18 @@ def aim_joint_row(
     shortest rotation, so that heads stay level and people turn round for what is behind them instead of
     bending over backwards.
     """
+    inverse_pitch, inverse_heading = ONE / pitch, ONE / heading
     for lane in range(LANES):
-        w = carry[ROTATION + lane]
-        i = carry[ROTATION + LANES + lane]
-        j = carry[ROTATION + 2 * LANES + lane]
-        k = carry[ROTATION + 3 * LANES + lane]
+        (w, i, j, k), (px, py, pz) = frame_below(row, carry, x, y, z, lane)
         fx, fy, fz = rotated(
             w, i, j, k, row[AHEAD + lane], row[AHEAD + LANES + lane], row[AHEAD + 2 * LANES + lane]
         )
         ex, ey, ez = rotated(
             w, i, j, k, row[EYE + lane], row[EYE + LANES + lane], row[EYE + 2 * LANES + lane]
         )
-        tx = carry[TARGET + lane] - carry[POSITION + lane] - ex
-        ty = carry[TARGET + LANES + lane] - carry[POSITION + LANES + lane] - ey
-        tz = carry[TARGET + 2 * LANES + lane] - carry[POSITION + 2 * LANES + lane] - ez
+        tx = carry[TARGET + lane] - px - ex
+        ty = carry[TARGET + LANES + lane] - py - ey
+        tz = carry[TARGET + 2 * LANES + lane] - pz - ez
         across = np.sqrt(tx * tx + tz * tz)
         distance = np.sqrt(across * across + ty * ty + TINY)
         level = np.sqrt(fx * fx + fz * fz + TINY)
@@ -272,13 +258,15 @@ def aim_joint_row(
         rise *= row[SHARE + lane] / level
         # The axis of the rise is to the left of the heading half-way through the turn.
         sine, cosine = sine_cosine(HALF * turn)
-        x, y, z = rotated(
+        a, b, c = rotated(
             w, -i, -j, -k, rise * (fx * sine - fz * cosine), turn, rise * (fx * cosine + fz * sine)
         )
-        factor = within_ellipse(x, y, pitch, heading)
-        row[WANTED + lane] = x * factor + bias_x
-        row[WANTED + LANES + lane] = y * factor + bias_y
-        row[WANTED + 2 * LANES + lane] = min(max(z, -roll), roll) + bias_z
+        factor = within_ellipse(a, b, inverse_pitch, inverse_heading)
+        a, b, c = a * factor + bias_x, b * factor + bias_y, min(max(c, -roll), roll) + bias_z
+        row[WANTED + lane] = a
+        row[WANTED + LANES + lane] = b
+        row[WANTED + 2 * LANES + lane] = c
+        put_frame(product(w, i, j, k, *exponential(a, b, c)), (px, py, pz), carry, lane)
 
 
 @inlined_kernel
@@ -317,6 +305,7 @@ def swing_row(row: Any, carry: Any, frequency: Any, decay: Any, dt: Any) -> None
     frequency, decay, dt : float32
         1/s, exp(-frequency dt), s.
     """
+    inverse_step = ONE / dt
     for lane in range(LANES):
         follow = carry[FOLLOW + lane]
         share = follow * carry[MEAN + lane]
@@ -344,33 +333,44 @@ def swing_row(row: Any, carry: Any, frequency: Any, decay: Any, dt: Any) -> None
         row[RATE + lane] = x_rate
         row[RATE + LANES + lane] = y_rate
         row[RATE + 2 * LANES + lane] = z_rate
-        carry[SPEED + lane] += np.sqrt(x * x + y * y + z * z) / dt
+        carry[SPEED + lane] += np.sqrt(x * x + y * y + z * z) * inverse_step
 
 
 @inlined_kernel
-def settle_row(row: Any, carry: Any, most_speed: Any) -> None:
-    """Take the step of a joint, slowed down so that the head keeps its largest speed, and turn the joint."""
+def settle_row(row: Any, carry: Any, x: Any, y: Any, z: Any, most_speed: Any) -> None:
+    """Take the step of a joint, slowed down so that the head keeps its largest speed, and turn the joint.
+
+    Parameters
+    ----------
+    row : (JOINT_ROW,) float32
+        The joint: turn, rate and rotation are updated.
+    carry : (CARRY_ROW,) float32
+        Speed of the head; frame of the joint above, replaced by the joint's.
+    x, y, z : float32
+        Rest offset, m.
+    most_speed : float32
+        rad/s.
+    """
     for lane in range(LANES):
         slow = most_speed / max(carry[SPEED + lane], most_speed)
-        x = row[TURN + lane] + slow * row[WANTED + lane]
-        y = row[TURN + LANES + lane] + slow * row[WANTED + LANES + lane]
-        z = row[TURN + 2 * LANES + lane] + slow * row[WANTED + 2 * LANES + lane]
-        row[TURN + lane] = x
-        row[TURN + LANES + lane] = y
-        row[TURN + 2 * LANES + lane] = z
+        a = row[TURN + lane] + slow * row[WANTED + lane]
+        b = row[TURN + LANES + lane] + slow * row[WANTED + LANES + lane]
+        c = row[TURN + 2 * LANES + lane] + slow * row[WANTED + 2 * LANES + lane]
+        row[TURN + lane] = a
+        row[TURN + LANES + lane] = b
+        row[TURN + 2 * LANES + lane] = c
         row[RATE + lane] *= slow
         row[RATE + LANES + lane] *= slow
         row[RATE + 2 * LANES + lane] *= slow
-        a, b, c, d = exponential(x, y, z)
-        w, i, j, k = product(
+        turned = product(
             row[ROTATION + lane], row[ROTATION + LANES + lane],
             row[ROTATION + 2 * LANES + lane], row[ROTATION + 3 * LANES + lane],
-            a, b, c, d,
+            *exponential(a, b, c),
         )  # fmt: skip
-        row[ROTATION + lane] = w
-        row[ROTATION + LANES + lane] = i
-        row[ROTATION + 2 * LANES + lane] = j
-        row[ROTATION + 3 * LANES + lane] = k
+        for component in range(4):
+            row[ROTATION + component * LANES + lane] = turned[component]
+        rotation, position = frame_below(row, carry, x, y, z, lane)
+        put_frame(rotation, position, carry, lane)
 
 
 @inlined_kernel
@@ -392,6 +392,7 @@ def aim_eye_row(
     most_step : float32
         Largest change of the turn, rad.
     """
+    inverse_pitch, inverse_heading = ONE / pitch, ONE / heading
     for lane in range(LANES):
         scale = eye[EYE_SCALE + lane]
         w = carry[ROTATION + lane]
@@ -415,7 +416,7 @@ def aim_eye_row(
         angle = angle if carry[GOAL + lane] > ZERO else ZERO
         a = -ty * angle
         b = tx * angle
-        factor = within_ellipse(a, b, pitch, heading)
+        factor = within_ellipse(a, b, inverse_pitch, inverse_heading)
         a = a * factor - eye[TURN + lane]
         b = b * factor - eye[TURN + LANES + lane]
         factor = most_step / max(np.sqrt(a * a + b * b), most_step)
@@ -424,7 +425,7 @@ def aim_eye_row(
         eye[TURN + lane] = a
         eye[TURN + LANES + lane] = b
         angle = np.sqrt(a * a + b * b + TINY)
-        sine, cosine = sine_cosine(angle)
+        sine, cosine = acute_sine_cosine(angle)
         sine /= angle
         rx = b * sine
         ry = -a * sine
@@ -437,10 +438,11 @@ def aim_eye_row(
 @inlined_kernel
 def turn_eye_row(eye: Any, pitch: Any, heading: Any) -> None:
     """Turn the local rotation of an eye by gaze and saccade together, within the eye's limits."""
+    inverse_pitch, inverse_heading = ONE / pitch, ONE / heading
     for lane in range(LANES):
         a = eye[TURN + lane] + eye[OFFSET + lane]
         b = eye[TURN + LANES + lane] + eye[OFFSET + LANES + lane]
-        factor = within_ellipse(a, b, pitch, heading)
+        factor = within_ellipse(a, b, inverse_pitch, inverse_heading)
         a, b, c, d = exponential(a * factor, b * factor, ZERO)
         w, i, j, k = product(
             eye[ROTATION + lane], eye[ROTATION + LANES + lane],

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
+from crowd_kernels._jit import IS_THREADED, inlined_kernel, parallel_kernel, prange
 from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.grasp import CHUNKS
 from crowd_kernels.hand import (
@@ -95,7 +95,8 @@ def pose_hands(
     count = active.shape[0]
     for k in prange(CHUNKS):
         chunk = (k * 37) % CHUNKS
-        closure, rotation = scratch[chunk, :LANES], scratch[chunk, LANES:FINGER_ROW]
+        own = scratch[chunk if IS_THREADED else 0]
+        closure, rotation = own[:LANES], own[LANES:FINGER_ROW]
         for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             row = active[index]
             pose = pose_rotation[row]

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crowd_kernels._jit import kernel, parallel_kernel, prange
+from crowd_kernels._jit import IS_THREADED, kernel, parallel_kernel, prange
 from crowd_kernels.ik_effector import effector_row
 from crowd_kernels.ik_gather import FAR, gather_effectors, gather_joints
 from crowd_kernels.ik_lanes import add_row, running_row, sum_row
@@ -465,7 +465,7 @@ def solve_crowd(
             active,
             chunk * block_count // CHUNKS,
             (chunk + 1) * block_count // CHUNKS,
-            scratch[chunk],
+            scratch[chunk if IS_THREADED else 0],
             pose_rotation,
             root_position,
             out_status,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import inlined_kernel, kernel, parallel_kernel, prange
+from crowd_kernels._jit import IS_THREADED, inlined_kernel, kernel, parallel_kernel, prange
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.lanes import COMPONENT, LANES, gather_block, interleave, scatter_block
 from crowd_kernels.quaternion import Quaternion, multiply, rotate
@@ -220,7 +220,7 @@ def kinematics(
             active,
             chunk * block_count // CHUNKS,
             (chunk + 1) * block_count // CHUNKS,
-            scratch[chunk],
+            scratch[chunk if IS_THREADED else 0],
             out_joint_position_model,
             out_joint_rotation_model,
         )
@@ -287,7 +287,7 @@ def local_rotations(pose_rotation: Any, active: Any, scratch: Any, out_rotation_
             active,
             chunk * count // CHUNKS,
             (chunk + 1) * count // CHUNKS,
-            scratch[chunk],
+            scratch[chunk if IS_THREADED else 0],
             out_rotation_local,
         )
 
