@@ -22,6 +22,7 @@ LOCK_LIMITS = LockLimits(
     stretch=0.99,
     swing_rate=16.0,
     ground_rate=30.0,
+    # What legs of walkers need changes more slowly in 99.9 % of frames; what is faster would show as a jerk.
     pelvis_speed=0.2,
     pelvis_rate=28.0,
 )

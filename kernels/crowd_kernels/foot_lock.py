@@ -43,9 +43,9 @@ class PlannedLeg(NamedTuple):
     """A leg in the animation, and where its foot is to go; root frame, vectors in m."""
 
     hip: Vector
-    thigh_bone: Vector
+    to_knee: Vector
     """From hip to knee."""
-    shank_bone: Vector
+    knee_to_ankle: Vector
     """From knee to ankle."""
     heel: Vector
     """From the ankle."""
@@ -88,8 +88,8 @@ def scaled_offset(legs: LegArrays, leg: int, part: int, scale: Any) -> Vector:
 
 
 @inlined_kernel
-def bone_length(legs: LegArrays, leg: int, part: int, scale: Any) -> float:
-    """Find the length of a leg bone in a character's own proportions, m."""
+def limb_length(legs: LegArrays, leg: int, part: int, scale: Any) -> float:
+    """Find the length of a thigh or shank in a character's own proportions, m."""
     return float(legs.length[leg, part]) * float(scale[legs.segment[leg, part]])
 
 
@@ -155,9 +155,9 @@ def plan_leg(
     foot = multiply(shank, unit_rotation(row, legs.joint[leg, 2]))
     toe = multiply(foot, unit_rotation(row, legs.joint[leg, 3]))
     hip = add(pelvis, rotate(pelvis_rotation, scaled_offset(legs, leg, 0, scale)))
-    thigh_bone = rotate(thigh, scaled_offset(legs, leg, 1, scale))
-    shank_bone = rotate(shank, scaled_offset(legs, leg, 2, scale))
-    ankle = add(hip, add(thigh_bone, shank_bone))
+    to_knee = rotate(thigh, scaled_offset(legs, leg, 1, scale))
+    knee_to_ankle = rotate(shank, scaled_offset(legs, leg, 2, scale))
+    ankle = add(hip, add(to_knee, knee_to_ankle))
     heel = rotate(foot, sole_point(legs, leg, 0, scale))
     ball = rotate(foot, sole_point(legs, leg, 1, scale))
     tip = add(rotate(foot, scaled_offset(legs, leg, 3, scale)), rotate(toe, sole_point(legs, leg, 2, scale)))
@@ -192,12 +192,12 @@ def plan_leg(
     pivot = heel if contact[character, leg] == HEEL else ball
     turned_pivot = turned_heel if contact[character, leg] == HEEL else turned_ball
     target = add(add(ankle, moved), subtract(pivot, turned_pivot))
-    length = bone_length(legs, leg, 1, scale) + bone_length(legs, leg, 2, scale)
+    length = limb_length(legs, leg, 1, scale) + limb_length(legs, leg, 2, scale)
     drop = min(needed_drop(hip, target, length, limits.stretch), LOWEST * leg_scale)
     return PlannedLeg(
         hip,
-        thigh_bone,
-        shank_bone,
+        to_knee,
+        knee_to_ankle,
         turned_heel,
         turned_ball,
         thigh,
@@ -240,16 +240,16 @@ def bend_leg(
     All other arguments are those of `plan_leg` and `lock_feet_crowd`.
     """
     hip = (plan.hip[0], plan.hip[1] - drop, plan.hip[2])
-    knee = add(hip, plan.thigh_bone)
+    knee = add(hip, plan.to_knee)
     hinge = rotate(plan.thigh, (1.0, 0.0, 0.0))
-    first, second, _ = bend_rotations(hip, knee, add(knee, plan.shank_bone), plan.ankle, hinge, stretch)
+    first, second, _ = bend_rotations(hip, knee, add(knee, plan.knee_to_ankle), plan.ankle, hinge, stretch)
     thigh = multiply(first, plan.thigh)
     shank = multiply(first, multiply(second, plan.shank))
     set_joint_rotation(row, legs.joint[leg, 0], multiply(conjugate(pelvis_rotation), thigh))
     set_joint_rotation(row, legs.joint[leg, 1], multiply(conjugate(thigh), shank))
     set_joint_rotation(row, legs.joint[leg, 2], multiply(conjugate(shank), plan.foot))
-    leg_bone = rotate(first, add(plan.thigh_bone, rotate(second, plan.shank_bone)))
-    ankle = add(place, turned_about_y(cosine, sine, add(hip, leg_bone)))
+    to_ankle = rotate(first, add(plan.to_knee, rotate(second, plan.knee_to_ankle)))
+    ankle = add(place, turned_about_y(cosine, sine, add(hip, to_ankle)))
     heel = add(ankle, turned_about_y(cosine, sine, plan.heel))
     ball = add(ankle, turned_about_y(cosine, sine, plan.ball))
     for axis in range(3):

@@ -12,7 +12,7 @@ from crowd.bench.reach import (
     random_targets,
     random_turns,
 )
-from crowd.motion.rotation import from_vector, multiply
+from crowd.motion.rotation import conjugate, from_vector, multiply
 from crowd_kernels.reach_goal import HOLD, MOVING, OUT_OF_REACH, REACHED
 
 PEOPLE = 60
@@ -161,6 +161,36 @@ def test_a_held_target_that_turns_is_followed_in_human_time(reachers, rng):
     shown += frames(reachers, 80)
     assert (state.reach_status[:, 0] == REACHED).mean() > 0.5
     assert angular_motion(np.array(shown), simulation.dt)[1] < allowed(reachers)
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+@pytest.mark.parametrize("fastest", [1.0, 3.0])
+def test_hands_keep_their_place_and_follow_targets_that_turn_fast(reachers, hand, fastest, rng):
+    """Targets turn to and fro by up to half a radian, at up to `fastest` rad/s, under hands that hold."""
+    simulation, swing = reachers.simulation, 0.5
+    state, dt = simulation.state, simulation.dt
+    target = before_the_body(reachers, hand, rng)
+    reachers.reach(hand, target)
+    frames(reachers, 85)
+    first = reachers.hand(hand)[1]
+    reachers.reach(hand, target, first)
+    shown = frames(reachers, 40)
+    axis, heading = random_turns(PEOPLE, rng), state.reach_target_rotation_world[:, hand]
+    heading = multiply(heading.copy(), conjugate(first))
+    away, behind = [], []
+    for frame in range(240):
+        # Motion begins softly, as that of things in other hands does.
+        angle = swing * min(frame * dt, 1.0) ** 3 * np.sin(fastest / swing * frame * dt)
+        turned = multiply(from_vector(angle * axis), first)
+        state.reach_target_rotation_world[:, hand] = multiply(heading, turned)
+        shown += frames(reachers, 1)
+        place, rotation = reachers.hand(hand)
+        away.append(np.linalg.norm(place - target, axis=1))
+        behind.append(2 * np.arccos(np.minimum(np.abs((rotation * turned).sum(axis=1)), 1)))
+    away, behind = np.array(away), np.array(behind)
+    assert away.max() < 1e-3
+    assert behind.max() < 0.15 * fastest, "a hand follows within 0.15 s"
+    assert angular_motion(np.array(shown), dt)[1] < allowed(reachers)
 
 
 def test_a_second_start_before_the_first_step_moves_no_hand_at_once(reachers, rng):

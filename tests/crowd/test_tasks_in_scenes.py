@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import crowd
+from crowd.checkpoint import state_arrays
+from crowd.controllers.carrying import CARRYING, PLACING
+from crowd.controllers.grab import CLOSING, HOLDING, OPEN
 from crowd.errors import MotionError
 from crowd.motion.procedural import built_in_library
 from crowd.tasks.events import EventKind
@@ -294,6 +297,28 @@ def test_a_run_with_tasks_goes_on_after_a_stop_with_equal_bits(tmp_path):
     assert second.step_index == whole.step_index
     assert np.array_equal(whole.state.pose_rotation, second.state.pose_rotation)
     assert np.array_equal(whole.objects.position_world, second.objects.position_world)
+
+
+def test_a_run_stopped_while_hands_reach_hold_and_hand_over_goes_on_with_equal_bits(tmp_path):
+    scenario = crowd.load_scenario("hand_over")
+    whole, other = crowd.Simulation(scenario, threads=1), crowd.Simulation(scenario, threads=1)
+    stops, ahead, expected, met = (230, 600, 720, 760), 40, {}, set()
+    for step in range(1, stops[-1] + ahead + 1):
+        whole.step()
+        if step in stops:
+            whole.save(tmp_path / f"{step}.npz")
+            met |= set(whole.state.grab_stage.ravel().tolist())
+            met |= {f"carries {stage}" for stage in whole.state.carry_stage.tolist()}
+        if step - ahead in stops:
+            expected[step - ahead] = {name: array.copy() for name, array in state_arrays(whole)}
+    assert met >= {OPEN, CLOSING, HOLDING, f"carries {PLACING}", f"carries {CARRYING}"}
+    # What the simulation did before, and in which order runs are taken up, leaves nothing behind.
+    for stop in reversed(stops):
+        other.restore(tmp_path / f"{stop}.npz")
+        for _ in range(ahead):
+            other.step()
+        for name, array in state_arrays(other):
+            np.testing.assert_array_equal(array, expected[stop][name], err_msg=f"{stop}: {name}")
 
 
 def test_a_library_without_the_clips_of_tasks_is_refused_before_the_run(tmp_path):

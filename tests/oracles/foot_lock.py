@@ -138,22 +138,22 @@ class Person:
 
 @dataclass
 class Leg:
-    """Joints and bones of one leg in the world."""
+    """Joints and limbs of one leg in the world."""
 
     hip: np.ndarray
     rotations: list[Rotation]
-    bones: list[np.ndarray]
+    limbs: list[np.ndarray]
     sole: np.ndarray
 
     def joints(self):
-        knee = self.hip + self.rotations[0].apply(self.bones[0])
-        return knee, knee + self.rotations[1].apply(self.bones[1])
+        knee = self.hip + self.rotations[0].apply(self.limbs[0])
+        return knee, knee + self.rotations[1].apply(self.limbs[1])
 
     def points(self):
         """Heel, ball and tip."""
         ankle = self.joints()[1]
         heel, ball = ankle + self.rotations[2].apply(self.sole[:2])
-        toe = ankle + self.rotations[2].apply(self.bones[2])
+        toe = ankle + self.rotations[2].apply(self.limbs[2])
         return heel, ball, toe + self.rotations[3].apply(self.sole[2])
 
     def bend(self, target, turn, stretch):
@@ -203,7 +203,7 @@ def lock(person, legs, limits, scale, position, yaw, wanted, dt, quaternions, pe
         foot.plan(wanted[side], heel, ball, tip, np.arctan2(ahead[0], ahead[2]), leg_scale, limits, dt)
         pivot = heel if foot.contact == HEEL else ball
         target = pivot + foot.offset + about_y(foot.yaw).apply(leg.joints()[1] - pivot)
-        length = sum(np.linalg.norm(bone) for bone in offsets[1:3])
+        length = sum(np.linalg.norm(limb) for limb in offsets[1:3])
         built.append(leg)
         targets.append(target)
         needs.append(min(needed_drop(leg.hip, target, length, limits.stretch), LOWEST * leg_scale))

@@ -28,7 +28,7 @@ AnyArray = npt.NDArray[Any]
 USUAL_RATE = 30.0
 """Animations are keyed at any times; they are sampled at this rate, Hz."""
 LONGEST = 3600.0
-"""Longer animations are refused, s."""
+"""Longer animations are refused, s: times of an hour come from slips of units, and would fill the memory."""
 MAGIC, VERSION, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 COMPONENTS: dict[int, np.dtype[Any]] = {
     5120: np.dtype("<i1"),
