@@ -194,6 +194,9 @@ class Carrying:
         state.carry_velocity[rows] = 0.0
         state.carry_turn_velocity[rows] = 0.0
         state.carry_place_world[rows], state.carry_place_rotation_world[rows] = place, turn
+        # Hands are to hold it as they do: what they lacked when they closed is not wanted any more.
+        state.reach_missing_place[rows] = 0.0
+        state.reach_missing_turn[rows] = 0.0
         self._begin(state, rows, np.full(rows.size, PLACING))
         stays = rows[~self._lacks[rows]]
         state.carry_progress[stays] = 1.0
@@ -272,6 +275,11 @@ class Carrying:
         turned = share[:, None] * turn + drift * state.carry_start_turn_velocity[rows]
         rotation = multiply(from_vector(turned), start_rotation)
         position, rotation = self._limited(state, rows, (position, rotation))
+        # What was taken outside the room comes into it along the course.
+        inside, inside_rotation = self._limited(state, rows, (start, start_rotation))
+        position += (1.0 - share)[:, None] * (start - inside)
+        outside = to_vector(multiply(start_rotation, conjugate(inside_rotation)))
+        rotation = multiply(from_vector((1.0 - share)[:, None] * outside), rotation)
         state.carry_velocity[rows] = (position - state.carry_position[rows]) / dt
         change = to_vector(multiply(rotation, conjugate(state.carry_rotation[rows])))
         state.carry_turn_velocity[rows] = change / dt

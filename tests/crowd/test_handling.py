@@ -166,6 +166,22 @@ def test_a_large_thing_is_put_down_with_both_hands(carriers: Simulation) -> None
     assert np.linalg.norm(objects.position_world - wanted, axis=1).max() < 0.01
 
 
+@pytest.mark.parametrize("place", [(0.0, 1.2, 0.8), (-0.3, 0.78, 0.7), (0.0, 1.75, 0.45), (0.0, 1.0, 0.6)])
+def test_a_thin_plate_comes_from_afar_without_a_jump_of_the_head(place: Any) -> None:
+    """Also from where both hands just come to it but carry nothing."""
+    plate = {"name": "plate", "shape": "box", "size": [0.3, 0.01, 0.3], "position": list(place)}
+    simulation = simulation_of([plate], [(0, 0, 0, 1.75)])
+    head, places = simulation.model.skeleton.joint("head"), []
+    simulation.commands.grasp(0, "plate", "both")
+    for _ in range(150):
+        simulation.step()
+        places.append(simulation.joint_positions_world()[0, head])
+        assert simulation.objects.holder[0] < 0 or apart(simulation, 0) < 1e-3
+    assert (simulation.state.grab_stage[0] == HOLDING).all()
+    acceleration = np.linalg.norm(np.diff(places, 2, axis=0), axis=1) / simulation.dt**2
+    assert acceleration.max() < 15.0
+
+
 def two_handed(dt: float = 1 / 60, walls: Any = (), people: Any = ((0, 0, 0, 1.75),)) -> Simulation:
     """A person with a carton between both hands, and others."""
     simulation = simulation_of([CARTON], people, dt, walls)
