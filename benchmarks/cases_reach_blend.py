@@ -17,7 +17,7 @@ from crowd_kernels.aligned import aligned_copy, aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.reach import CHUNKS, reach_crowd
-from crowd_kernels.reach_blend import CHAIN, LANES, ROW, SAME_PLACE
+from crowd_kernels.reach_blend import CHAIN, LANES, SAME_PLACE, SCRATCH_ROW
 from crowd_kernels.reach_goal import ReachState
 from crowd_kernels.reach_space import NEAREST
 
@@ -116,7 +116,7 @@ def set_up(size: int, rng: np.random.Generator) -> MovingHands:
         aligned_copy(state.pose_pelvis),
         ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields)),
         *reachers.space.scratch(),
-        aligned_zeros((CHUNKS, 2 * ROW), np.float32),
+        aligned_zeros((CHUNKS, SCRATCH_ROW), np.float32),
         aligned_zeros((size, 2), np.uint8),
         aligned_zeros((size, 2, 3), np.float32),
         aligned_zeros((size, 2, 4), np.float32),

@@ -191,6 +191,8 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
     """Sample all examples and keep the joints that reaches write."""
     groups = {joint: group_of(name) for joint, name in enumerate(skeleton.joint_names)}
     joints = [joint for joint, group in groups.items() if group is not None]
+    if len(joints) > LANES:
+        raise MotionError(describe("reach", "too many joints of the body", len(joints), f"at most {LANES}"))
     clips = [clip for part in sets for clip in part]
     sampled = [sample_keys(clip, KEY_RATE) for clip in clips]
     count = np.array([len(rotation) for rotation, _ in sampled], np.int32)
@@ -213,7 +215,7 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
         np.ascontiguousarray(pelvis[first[starts]], np.float64),
         int(sum(len(part) for part in sets[: len(SIDES)])),
         np.array(joints, np.int32),
-        np.array([groups[joint] for joint in joints], np.int32),
+        np.array([groups[joint] for joint in joints] + [LOWER] * (LANES - len(joints)), np.int32),
         np.array([[joints.index(joint) for joint in chain] for chain in chains], np.int32),
         np.searchsorted(np.unique(chains), chains).astype(np.int32),
         np.ascontiguousarray(skeleton.offset[chains]),

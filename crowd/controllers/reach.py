@@ -28,7 +28,7 @@ from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
 from crowd_kernels.reach import CHUNKS, reach_crowd
-from crowd_kernels.reach_blend import ROW
+from crowd_kernels.reach_blend import SCRATCH_ROW
 from crowd_kernels.reach_correction import LANES, keep_corrections, start_solves
 from crowd_kernels.reach_goal import (
     MOVE,
@@ -144,7 +144,7 @@ class Reach:
         self._tree = self._trees[(1 << len(EFFECTORS)) - 1]
         require_lanes(len(self._tree.joint))
         capacity = len(stature)
-        self._rows = aligned_zeros((CHUNKS, 2 * ROW), np.float32)
+        self._rows = aligned_zeros((CHUNKS, SCRATCH_ROW), np.float32)
         length = scratch_length(len(self._tree.joint), len(EFFECTORS), len(Segment))
         self._solve_scratch = aligned_zeros((CHUNKS, length), np.float32)
         self._solution = aligned_zeros((capacity, 4 * PADDED_JOINTS), np.float32)

@@ -175,7 +175,7 @@ def aim_hand(
         Proportions.
     live_pelvis, live_rotation : tuple of float
         Pelvis of the pose below this layer, root frame, m.
-    row : (128,) float32
+    row : (96,) float32
         Scratch.
     pose : (256,) float32
         Pose row, blended.
@@ -316,7 +316,7 @@ def reach_character(
         Scratch.
     real : (100 + E,) float64
         Scratch.
-    rows : (256,) float32
+    rows : (SCRATCH_ROW,) float32
         Scratch.
     correction : (96,) float32
         Last corrections of the character's joints, see `reach_correction`.
@@ -327,8 +327,6 @@ def reach_character(
     -----
     All other arguments are those of `reach_crowd`.
     """
-    row = rows[:ROW]
-    total = rows[ROW:]
     live_pelvis, live_rotation = pelvis_of(keys, scale, pose, pelvis)
     own = (0.0, 0.0)
     begin = (False, False)
@@ -358,7 +356,7 @@ def reach_character(
             share, _ = course_shares(state.course[character, arm], limits.lead)
             state.weight[character, arm] = share
             own = (share, own[1]) if arm == 0 else (own[0], share)
-    blend_body(character, walking_share, keys, own, state, row, total, pose, pelvis)
+    blend_body(character, walking_share, keys, own, state, rows, pose, pelvis)
     for arm in range(2):
         out_task[character, arm] = 0
         if state.stage[character, arm] != NONE:
@@ -374,7 +372,7 @@ def reach_character(
                 limits,
                 state,
                 dt,
-                row,
+                rows[:ROW],
                 pose,
                 pelvis,
                 correction,
@@ -442,7 +440,7 @@ def reach_crowd(
         Scratch.
     real : (32, 100 + E) float64
         Scratch; 0 from `SCRATCH` on before and after.
-    rows : (32, 256) float32
+    rows : (32, SCRATCH_ROW) float32
         Scratch.
     correction : (N, 96) float32
         Last corrections, see `reach_correction`.

@@ -1,7 +1,7 @@
 """The pose of reaching people: examples of both hands, blended over the pose below.
 
 Both sections of all examples are stretched to the course of the reach, so that apexes coincide. Pose rows are
-compact here: 32 joints, of which the body uses the first ones; fingers are left to grasping.
+compact here: the 24 joints of pelvis, legs, trunk, head and arms; fingers are left to grasping.
 """
 
 import math
@@ -27,9 +27,11 @@ from crowd_kernels.reach_goal import (
 from crowd_kernels.reach_space import NEAREST, SCRATCH, ReachArrays, weigh_examples
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
-LANES = 32
+LANES = 24
 ROW = 4 * LANES
-"""Length of a compact pose row: components outermost, 32 joints each."""
+"""Length of a compact pose row: components outermost, 24 joints each."""
+SCRATCH_ROW = 3 * ROW + LANES
+"""Length of a chunk's scratch row for `reach_crowd`."""
 SLOTS = 24
 """Most examples that are blended for one hand."""
 LEAST_WEIGHT = 1e-4
@@ -51,7 +53,7 @@ class ReachKeys(NamedTuple):
     """Key frames of all examples and the joints that they hold."""
 
     rotation: npt.NDArray[np.float32]
-    """(K, 128) Compact pose rows, signs aligned over all keys."""
+    """(K, 96) Compact pose rows, signs aligned over all keys."""
     pelvis: npt.NDArray[np.float32]
     """(K, 3) Pelvis in the root frame, m."""
     first_key: npt.NDArray[np.int32]
@@ -71,7 +73,7 @@ class ReachKeys(NamedTuple):
     joint: npt.NDArray[np.int32]
     """(J,) Skeleton joint of each compact joint."""
     group: npt.NDArray[np.int32]
-    """(J,) Group of each compact joint."""
+    """(24,) Group of each compact joint; the last ones are spare."""
     chain: npt.NDArray[np.int32]
     """(2, 9) Compact joints from pelvis to right and left hand."""
     chain_place: npt.NDArray[np.int32]
@@ -359,9 +361,9 @@ def blend_row(key: Any, next_key: Any, weight: Any, next_weight: Any, out_sum: A
 
     Parameters
     ----------
-    key, next_key : (128,) float32
+    key, next_key : (96,) float32
     weight, next_weight : float32
-    out_sum : (128,) float32
+    out_sum : (96,) float32
         In and out.
     """
     for lane in range(ROW):
@@ -374,7 +376,7 @@ def unit_row(row: Any) -> None:
 
     Parameters
     ----------
-    row : (128,) float32
+    row : (96,) float32
         In and out; quaternions without length become the identity.
     """
     for lane in range(LANES):
@@ -405,7 +407,7 @@ def sum_examples(
     course : float
     keys : ReachKeys
     state : ReachState
-    row : (128,) float32
+    row : (96,) float32
         In and out.
 
     Returns
@@ -460,74 +462,96 @@ def weight_of_part(
 
 
 @inlined_kernel
-def add_group_row(
-    keys: ReachKeys, row: Any, pose: Any, lower: float, upper: float, right: float, left: float, out_sum: Any
-) -> None:
-    """Add a compact row to a sum, signs as in a pose, with a share for each group of joints.
-
-    Parameters
-    ----------
-    keys : ReachKeys
-    row : (128,) float32
-        Unit quaternions.
-    pose : (256,) float32
-        Pose row.
-    lower, upper, right, left : float
-        Shares of the groups.
-    out_sum : (128,) float32
-        In and out.
-    """
+def read_joints(keys: ReachKeys, pose: Any, out_row: Any) -> None:
+    """Read the joints of a compact row from a pose row."""
     for k in range(keys.joint.shape[0]):
-        group = keys.group[k]
-        arms = right if group == RIGHT_ARM else left
-        share = np.float32(lower if group == LOWER else (upper if group == UPPER else arms))
         joint = keys.joint[k]
-        w, x, y, z = row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k]
-        cosine = (
-            w * pose[joint]
-            + x * pose[PADDED_JOINTS + joint]
-            + y * pose[2 * PADDED_JOINTS + joint]
-            + z * pose[3 * PADDED_JOINTS + joint]
-        )
-        share = -share if cosine < ZERO else share
-        out_sum[k] += share * w
-        out_sum[LANES + k] += share * x
-        out_sum[2 * LANES + k] += share * y
-        out_sum[3 * LANES + k] += share * z
+        out_row[k] = pose[joint]
+        out_row[LANES + k] = pose[PADDED_JOINTS + joint]
+        out_row[2 * LANES + k] = pose[2 * PADDED_JOINTS + joint]
+        out_row[3 * LANES + k] = pose[3 * PADDED_JOINTS + joint]
 
 
 @inlined_kernel
-def write_pose(
-    keys: ReachKeys, total: Any, lower: float, upper: float, right: float, left: float, pose: Any
-) -> None:
-    """Write a sum of rows into a pose, completed by what the pose was.
+def write_joints(keys: ReachKeys, row: Any, rest: Any, pose: Any) -> None:
+    """Write the joints of a compact row into a pose row; those whose rest (24,) is 1 keep their bits."""
+    for k in range(keys.joint.shape[0]):
+        if rest[k] >= ONE:
+            continue
+        joint = keys.joint[k]
+        pose[joint] = row[k]
+        pose[PADDED_JOINTS + joint] = row[LANES + k]
+        pose[2 * PADDED_JOINTS + joint] = row[2 * LANES + k]
+        pose[3 * PADDED_JOINTS + joint] = row[3 * LANES + k]
+
+
+@inlined_kernel
+def share_row(group: Any, lower: Any, upper: Any, right: Any, left: Any, out_share: Any) -> None:
+    """Give each joint the share of its group.
 
     Parameters
     ----------
-    keys : ReachKeys
-    total : (128,) float32
-        Sum of rows times their shares.
-    lower, upper, right, left : float
-        Shares of the old pose in the groups; groups of share 1 keep their bits.
-    pose : (256,) float32
-        In and out: pose row.
+    group : (24,) int32
+        See `ReachKeys.group`.
+    lower, upper, right, left : float32
+        Shares of the groups.
+    out_share : (24,) float32
+        Written.
     """
-    for k in range(keys.joint.shape[0]):
-        group = keys.group[k]
-        arms = right if group == RIGHT_ARM else left
-        rest = np.float32(lower if group == LOWER else (upper if group == UPPER else arms))
-        if rest >= ONE:
-            continue
-        joint = keys.joint[k]
-        w = total[k] + rest * pose[joint]
-        x = total[LANES + k] + rest * pose[PADDED_JOINTS + joint]
-        y = total[2 * LANES + k] + rest * pose[2 * PADDED_JOINTS + joint]
-        z = total[3 * LANES + k] + rest * pose[3 * PADDED_JOINTS + joint]
-        scale = ONE / np.sqrt(w * w + x * x + y * y + z * z)
-        pose[joint] = w * scale
-        pose[PADDED_JOINTS + joint] = x * scale
-        pose[2 * PADDED_JOINTS + joint] = y * scale
-        pose[3 * PADDED_JOINTS + joint] = z * scale
+    for lane in range(LANES):
+        own = group[lane]
+        arms = right if own == RIGHT_ARM else left
+        out_share[lane] = lower if own == LOWER else (upper if own == UPPER else arms)
+
+
+@inlined_kernel
+def add_group_row(row: Any, live: Any, share: Any, out_sum: Any) -> None:
+    """Add a compact row to a sum, signs as in another, with a share for each joint.
+
+    Parameters
+    ----------
+    row, live : (96,) float32
+        Unit quaternions: what is added, and those that tell the signs.
+    share : (24,) float32
+    out_sum : (96,) float32
+        In and out.
+    """
+    for lane in range(LANES):
+        w, x = row[lane], row[LANES + lane]
+        y, z = row[2 * LANES + lane], row[3 * LANES + lane]
+        cosine = (
+            w * live[lane] + x * live[LANES + lane] + y * live[2 * LANES + lane] + z * live[3 * LANES + lane]
+        )
+        own = -share[lane] if cosine < ZERO else share[lane]
+        out_sum[lane] += own * w
+        out_sum[LANES + lane] += own * x
+        out_sum[2 * LANES + lane] += own * y
+        out_sum[3 * LANES + lane] += own * z
+
+
+@inlined_kernel
+def complete_row(live: Any, rest: Any, row: Any) -> None:
+    """Complete a sum of rows times their shares by what the pose was, to unit length.
+
+    Parameters
+    ----------
+    live : (96,) float32
+        The pose as it was.
+    rest : (24,) float32
+        Its shares.
+    row : (96,) float32
+        In and out.
+    """
+    for lane in range(LANES):
+        w = row[lane] + rest[lane] * live[lane]
+        x = row[LANES + lane] + rest[lane] * live[LANES + lane]
+        y = row[2 * LANES + lane] + rest[lane] * live[2 * LANES + lane]
+        z = row[3 * LANES + lane] + rest[lane] * live[3 * LANES + lane]
+        scale = ONE / np.sqrt(max(w * w + x * x + y * y + z * z, TINY))
+        row[lane] = w * scale
+        row[LANES + lane] = x * scale
+        row[2 * LANES + lane] = y * scale
+        row[3 * LANES + lane] = z * scale
 
 
 @inlined_kernel
@@ -537,8 +561,7 @@ def blend_body(
     keys: ReachKeys,
     own: tuple[float, float],
     state: ReachState,
-    row: Any,
-    total: Any,
+    rows: Any,
     pose: Any,
     pelvis: Any,
 ) -> None:
@@ -551,7 +574,7 @@ def blend_body(
     ----------
     own : tuple of float
         Shares of the right and left hand's examples.
-    row, total : (128,) float32
+    rows : (SCRATCH_ROW,) float32
         Scratch.
     pose : (256,) float32
         In and out: pose row.
@@ -562,6 +585,9 @@ def blend_body(
     -----
     All other arguments are those of `reach_character`.
     """
+    row, total, live = rows[:ROW], rows[ROW : 2 * ROW], rows[2 * ROW : 3 * ROW]
+    shares = rows[3 * ROW : SCRATCH_ROW]
+    read_joints(keys, pose, live)
     both = 1.0 - (1.0 - own[0]) * (1.0 - own[1])
     total[:] = ZERO
     x = 0.0
@@ -584,7 +610,15 @@ def blend_body(
             right = share * (own[arm] if arm == 0 else other)
             left = share * (own[arm] if arm == 1 else other)
             lower = share * trunk if part == 0 else 0.0
-            add_group_row(keys, row, pose, lower, share * trunk, right, left, total)
+            share_row(
+                keys.group,
+                np.float32(lower),
+                np.float32(share * trunk),
+                np.float32(right),
+                np.float32(left),
+                shares,
+            )
+            add_group_row(row, live, shares, total)
             x += lower * moved[0] / weight
             y += lower * moved[1] / weight
             z += lower * moved[2] / weight
@@ -592,7 +626,16 @@ def blend_body(
     still = 1.0 - walking_share
     right = (1.0 - own[0]) - own[1] * (1.0 - own[0]) * still
     left = (1.0 - own[1]) - own[0] * (1.0 - own[1]) * still
-    write_pose(keys, total, 1.0 - below, 1.0 - both, right, left, pose)
+    share_row(
+        keys.group,
+        np.float32(1.0 - below),
+        np.float32(1.0 - both),
+        np.float32(right),
+        np.float32(left),
+        shares,
+    )
+    complete_row(live, shares, total)
+    write_joints(keys, total, shares, pose)
     pelvis[0] = x + (1.0 - below) * pelvis[0]
     pelvis[1] = y + (1.0 - below) * pelvis[1]
     pelvis[2] = z + (1.0 - below) * pelvis[2]
@@ -600,7 +643,7 @@ def blend_body(
 
 @inlined_kernel
 def local_rotation(row: Any, joint: int, stride: int) -> Quaternion:
-    """Read a joint's rotation from a compact row (stride 32) or a pose row (stride 64)."""
+    """Read a joint's rotation from a compact row (stride 24) or a pose row (stride 64)."""
     return (
         float(row[joint]),
         float(row[stride + joint]),
@@ -645,7 +688,7 @@ def place_hand(
     pelvis_rotation : tuple of float
         Root frame.
     row : (4 * stride,) float32
-        Local rotations: a compact row (stride 32) or a pose row (stride 64).
+        Local rotations: a compact row (stride 24) or a pose row (stride 64).
     stride : int
 
     Returns

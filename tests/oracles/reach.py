@@ -29,7 +29,7 @@ def minimum_jerk(u):
 
 def blend(keys, weights, course):
     """Rotations (J, 4) and pelvis (3,) of examples, {number: weight}, at a course."""
-    rotation, pelvis = np.zeros((4, 32)), np.zeros(3)
+    rotation, pelvis = np.zeros((4, 24)), np.zeros(3)
     for clip, weight in weights.items():
         last = keys.key_count[clip] - 1
         place = (
@@ -41,7 +41,7 @@ def blend(keys, weights, course):
         share = place - before
         for key, own in ((before, 1 - share), (before + 1, share)):
             row = keys.first_key[clip] + key
-            rotation += weight * own * keys.rotation[row].astype(float).reshape(4, 32)
+            rotation += weight * own * keys.rotation[row].astype(float).reshape(4, 24)
             pelvis += weight * own * keys.pelvis[row]
     rotation = rotation.T[: len(keys.joint)]
     return rotation / np.linalg.norm(rotation, axis=1, keepdims=True), pelvis
