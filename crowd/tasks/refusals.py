@@ -55,6 +55,7 @@ class Refusals:
 
     def tell(self, time: float) -> None:
         """Add an event for each refusal since the last step."""
+        self._tell_of_ways(time)
         state = self._simulation.state
         reach, grab = state.reach_refusals - self.reach, state.grab_refusals - self.grab
         eyes = state.gaze_refusals - self.gaze
@@ -72,7 +73,6 @@ class Refusals:
             is_finite = np.isfinite(state.gaze_target_world[row]).all()
             why_not = "the target is too near" if is_finite else "there is no target"
             self._add(time, int(row), "gaze", why_not, int(eyes[row]))
-        self._tell_of_ways(time)
         self.reach[:], self.grab[:], self.gaze[:] = (
             state.reach_refusals,
             state.grab_refusals,
@@ -82,9 +82,12 @@ class Refusals:
     def _tell_of_ways(self, time: float) -> None:
         """Add an event for each walker who no longer finds a way to its goal; those of tasks give up."""
         simulation, state = self._simulation, self._simulation.state
-        rows = np.flatnonzero(state.is_active & state.wants_to_walk).astype(np.int32)
+        routing = simulation.navigator.routing
+        rows = np.flatnonzero(routing.status).astype(np.int32)
+        if rows.size == 0 and not self.is_cut_off.any():
+            return
         is_cut_off = np.zeros_like(self.is_cut_off)
-        is_cut_off[rows] = simulation.navigator.routing.is_cut_off(rows)
+        is_cut_off[rows] = (state.is_active & state.wants_to_walk)[rows] & routing.is_cut_off(rows)
         for row in np.flatnonzero(is_cut_off & ~self.is_cut_off):
             if not simulation.tasks.has_more(np.array([row], np.int32))[0]:
                 self._add(time, int(row), "walk", "there is no way to the goal", 1)
