@@ -26,6 +26,8 @@ class Case:
         Does the work once.
     check : callable
         After `run`: None when the answer is right, else what is wrong with it.
+    reset : callable, optional
+        Restores what a run changes, before each run; its time does not count.
     items : callable, optional
         Items that one run works through; the size when left out.
     peers : mapping of str to callable
@@ -41,6 +43,7 @@ class Case:
     setup: Callable[[int, np.random.Generator], Any]
     run: Run
     check: Callable[[Any], str | None]
+    reset: Run | None = None
     items: Callable[[Any], int] | None = None
     peers: Mapping[str, Run] = field(default_factory=dict)
     bound_us: float | None = None
@@ -78,10 +81,14 @@ class Result:
         return self.problem is None
 
 
-def best_seconds(run: Run, data: Any, least_seconds: float = 0.4, most_runs: int = 50) -> float:
-    """Least wall time of one run."""
+def best_seconds(
+    run: Run, data: Any, reset: Run | None = None, least_seconds: float = 0.4, most_runs: int = 50
+) -> float:
+    """Least wall time of one run, after what restores the data."""
     best, begin, runs = float("inf"), time.perf_counter(), 0
     while runs < 3 or (time.perf_counter() - begin < least_seconds and runs < most_runs):
+        if reset is not None:
+            reset(data)
         start = time.perf_counter()
         run(data)
         best = min(best, time.perf_counter() - start)
@@ -97,7 +104,7 @@ def measure(case: Case, size: int, seed: int = 1) -> Result:
     compile_seconds = time.perf_counter() - start
     problem = case.check(data)
     items = case.items(data) if case.items else size
-    us = best_seconds(case.run, data) / items * 1e6
+    us = best_seconds(case.run, data, case.reset) / items * 1e6
     peers = {}
     for name, run in case.peers.items():
         run(data)

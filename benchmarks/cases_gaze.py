@@ -72,7 +72,6 @@ def set_up(size: int, rng: np.random.Generator) -> Onlookers:
 def turn(data: Onlookers) -> None:
     """Turn everyone by one step."""
     state, size = data.state, data.state.capacity
-    state.pose_rotation[:] = data.pose
     gaze_crowd(
         data.gaze.arrays,
         data.gaze.limits,
@@ -100,7 +99,7 @@ def turn(data: Onlookers) -> None:
 
 
 def copy_poses(data: Onlookers) -> None:
-    """Restore the poses, which is part of each run of `turn`."""
+    """Restore the poses of the layers below, as they are anew in each frame."""
     data.state.pose_rotation[:] = data.pose
 
 
@@ -141,6 +140,7 @@ def rays_miss(data: Onlookers) -> npt.NDArray[np.float64]:
 def check_turn(data: Onlookers) -> str | None:
     """Let the turn settle; the rays of nearly all eyes then meet their targets."""
     for _ in range(SETTLE_STEPS):
+        copy_poses(data)
         turn(data)
     is_met = data.state.gaze_status == ON_TARGET
     if is_met.mean() < LEAST_ON_TARGET:
@@ -284,7 +284,7 @@ CASES = [
         set_up,
         turn,
         check_turn,
-        peers={"copy of the poses": copy_poses},
+        reset=copy_poses,
         bound_us=0.3,
     ),
     Case("gaze: eyes of others", SIZES, set_up, find_eyes, check_eyes),
