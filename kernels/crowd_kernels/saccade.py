@@ -227,7 +227,8 @@ def offset_eyes_crowd(
         for index in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             character = active[index]
             pitch, heading = float(offset[character, 0]), float(offset[character, 1])
-            factor = 1.0 / max(math.hypot(pitch / pitch_limit, heading / heading_limit), 1.0)
+            square = (pitch / pitch_limit) ** 2 + (heading / heading_limit) ** 2
+            factor = 1.0 / math.sqrt(max(square, 1.0))
             turn = from_rotation_vector((factor * pitch, factor * heading, 0.0))
             row = pose_rotation[character]
             for side in range(2):
