@@ -70,12 +70,13 @@ class TaskTable(Table):
     """Walk to an object, reach and grasp it; a name without number means the nearest free one of its kind
     that nobody has put down yet."""
     put_down: Something | None = None
-    """Walk to a free place on a piece of furniture, or to a point [x, y, z] of a surface, and put down what
-    the hand holds."""
+    """Walk to a free place on a piece of furniture, or to a point [x, y, z] of the ground, a board, the top
+    of an obstacle or of another object, and put down what the hand holds."""
     touch: Something | None = None
     """Walk to an object or a point [x, y, z] and touch it with the finger tips."""
     hand_over: Name | None = None
-    """Walk to another person, who has a task `take_from`, and give away what the hand holds."""
+    """Walk to another person, as soon as this one is at a task `take_from`, and give away what the hand
+    holds."""
     take_from: Name | None = None
     """Wait for another person, who has a task `hand_over`, and take what is held out."""
     look_at: Something | None = None

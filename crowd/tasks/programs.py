@@ -29,16 +29,13 @@ from crowd.tasks.acting import (
 )
 from crowd.tasks.choosing import (
     choose_look,
-    choose_meeting,
     choose_object,
     choose_seat,
     choose_spot,
     choose_touch,
     choose_walk,
-    face_giver,
-    find_partner,
-    find_taker,
 )
+from crowd.tasks.meeting import choose_meeting, face_giver, find_partner, find_taker
 from crowd.tasks.task_list import TaskKind
 from crowd.tasks.waits import Outcome, Wait
 
