@@ -191,14 +191,13 @@ class Population:
 
     def _has_arrived(self, state: State, walking: IntArray, dt: float) -> BoolArray:
         """Who is at the goal, or has stood long before a goal that others occupy."""
-        way = state.goal_world[walking] - state.position_world[walking]
-        distance = np.hypot(way[:, 0], way[:, 2])
-        radius = self.model.people.radius[walking]
-        speed = np.hypot(state.velocity_world[walking, 0], state.velocity_world[walking, 2])
-        is_stalled = (
-            (speed < STALLED_SPEED)
-            & (distance < STALLED_DISTANCE_RADII * radius + state.goal_radius[walking])
-            & self.stays_at_goal[walking]
-        )
+        away_x, _, away_z = (state.goal_world - state.position_world).take(walking, axis=0).T
+        square = away_x * away_x + away_z * away_z
+        goal_radius = state.goal_radius[walking]
+        near = STALLED_DISTANCE_RADII * self.model.people.radius[walking] + goal_radius
+        speed_x, _, speed_z = state.velocity_world.take(walking, axis=0).T
+        is_stalled = speed_x * speed_x + speed_z * speed_z < STALLED_SPEED**2
+        is_stalled &= (square < near * near) & self.stays_at_goal[walking]
         self.stalled_time[walking] = np.where(is_stalled, self.stalled_time[walking] + dt, 0.0)
-        return (distance < state.goal_radius[walking]) | (self.stalled_time[walking] > STALLED_TIME)
+        is_there = square < goal_radius * goal_radius
+        return np.asarray(is_there | (self.stalled_time[walking] > STALLED_TIME))

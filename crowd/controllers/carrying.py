@@ -155,13 +155,15 @@ class Carrying:
         Who lets hands return while both hold something carries it before the body.
         """
         state = step.state
-        items = np.flatnonzero(self._objects.holder_hand.all(axis=1)).astype(np.int32)
+        right, left = self._objects.holder_hand.T
+        items = np.flatnonzero(right & left).astype(np.int32)
         rows = self._objects.holder[items]
+        if rows.size == 0:
+            state.carry_stage.fill(FREE)
+            return
         is_empty = np.ones(state.capacity, np.bool_)
         is_empty[rows] = False
         state.carry_stage[is_empty] = FREE
-        if rows.size == 0:
-            return
         self._notice(state, rows, items)
         returns = np.asarray(~np.isin(state.reach_stage[rows], (HOLD, MOVE)).all(axis=1))
         self._change(state, rows, returns)
@@ -334,6 +336,8 @@ class Carrying:
     def report(self, state: State) -> None:
         """Tell how hands with an object between them stand, after the reach layer has told it of each."""
         rows = np.flatnonzero(state.carry_stage != FREE)
+        if rows.size == 0:
+            return
         is_there = (state.carry_progress[rows] >= 1.0) & (state.carry_stage[rows] != WAITING)
         state.reach_stage[rows[~is_there]] = MOVE
         state.reach_status[rows[~is_there]] = MOVING

@@ -335,7 +335,7 @@ class Grab:
         self.holding.drop_of_the_gone(state)
         rows, hands = _hands_where((state.grab_object >= 0) & state.is_active[:, None])
         status = state.grab_status[rows, hands]
-        waits = (status == GrabStatus.APPROACHING) | (status == GrabStatus.OUT_OF_REACH)
+        waits = (status == GrabStatus.APPROACHING.value) | (status == GrabStatus.OUT_OF_REACH.value)
         waits &= state.grab_stage[rows, hands] == OPEN
         if waits.any():
             awaits = waits & (state.grab_purpose[rows, hands] == AWAIT)
@@ -344,7 +344,7 @@ class Grab:
             self._arrive(state, (rows[waits], hands[waits]))
             self._lose_patience(state, (rows[waits], hands[waits]), step.dt)
         self.holding.follow(state)
-        touches = state.grab_status[rows, hands] == GrabStatus.TOUCHING
+        touches = state.grab_status[rows, hands] == GrabStatus.TOUCHING.value
         if touches.any():
             self._keep_touching(state, (rows[touches], hands[touches]))
         self.carrying.report(state)
