@@ -24,7 +24,7 @@ FORBIDDEN = {
     "benchmarks": ("crowd_viewer", "tests"),
 }
 KERNEL_IMPORTS = {"crowd_kernels", "numpy", "math", "typing", "collections"}
-JIT_IMPORTS = KERNEL_IMPORTS | {"numba", "ast", "functools", "hashlib", "os", "pathlib", "threading"}
+JIT_IMPORTS = KERNEL_IMPORTS | {"numba", "ast", "functools", "hashlib", "os", "pathlib", "threading", "types"}
 
 
 def module_name(path, package):
