@@ -235,7 +235,7 @@ def solve_block(
                 )
             build_system(tree, parts, joints, effectors, system[:used], push)
             solve_system(parts * count, parts, damping, system, push)
-            turn_joints(tree, joints, effectors, push, running, missing, error)
+            turn_joints(tree, ONE - approached, joints, effectors, push, running, missing, error)
             if sum_row(error) == ZERO:
                 break
         pull *= np.float32(settings.pull_fade)

@@ -42,14 +42,16 @@ NEXT_SWING = 37 * LANES
 ROOM = 40 * LANES
 """Bounds of this iteration: largest value of the swing ellipse, least and largest twist, 3."""
 LAST = 43 * LANES
-"""Square root of the value of the swing ellipse and twist of the last pose, 2."""
-EXCESS = 45 * LANES
+"""Swing x and y and twist of the last pose, 3."""
+WAY_SHARE = 46 * LANES
+"""How much of the way from the last swing to the next one the joint goes in this iteration, 0 to 1."""
+EXCESS = 47 * LANES
 """How far swing and twist of the next rotation are beyond the room, rad, 2."""
-IS_FIXED = 47 * LANES
+IS_FIXED = 49 * LANES
 """Not 0 in the first lane where some direction does not turn freely in some lane."""
 IS_OUTSIDE = IS_FIXED + 1
 """Not 0 where the next rotation leaves its room in some lane, or some axis never turns."""
-JOINT_ROW = 48 * LANES
+JOINT_ROW = 50 * LANES
 # An effector.
 POINT = 0
 """The point of the joint that has a target, in the joint's frame, m, 3."""

@@ -24,6 +24,7 @@ from crowd_kernels.ik_layout import (
     TINY,
     TWIST_BOUND,
     TWO,
+    WAY_SHARE,
     ZERO,
     put_quaternion,
     put_vector,
@@ -40,8 +41,13 @@ FREE_SHARE: Any = np.float32(0.1)
 a small angle to the first, would be fixed as well, and the joint would not slide along the limit."""
 SLACK: Any = np.float32(2e-5)
 """What rounding may leave of an excess: share of the swing ellipse's value, and of half the twist in rad."""
-GRAVE: Any = np.float32(0.3)
-"""Share of the largest excess from which directions are fixed: lesser ones often come back by themselves."""
+GRAVE: Any = np.float32(0.6)
+"""Share of the largest excess from which directions are fixed: lesser ones often come back by themselves.
+Where this is smaller, joints are held that would, and jump when they are let go; where it is larger, those
+at many limits at once are not all fixed in the passes that there are."""
+ENLARGED: Any = np.float32(1.1)
+"""Size of the ellipse ahead of which joints slow down along their motion, over that of the limit. Joints
+could not slide along their limits if it were 1."""
 
 
 @inlined_kernel
@@ -132,8 +138,7 @@ def hold_reference_row(
     """
     for lane in range(LANES):
         x, y, twist = split(into_limit(parent_frame, quaternion_at(row, FRAME, lane), joint_frame))
-        row[LAST + lane] = np.sqrt(x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y)
-        row[LAST + LANES + lane] = twist
+        put_vector(row, LAST, lane, (x, y, twist))
         x, y, twist = split(into_limit(parent_frame, quaternion_at(row, REFERENCE, lane), joint_frame))
         row[SWING_BOUND + lane] = max(ONE, x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y)
         row[TWIST_BOUND + lane] = min(low, twist)
@@ -178,21 +183,24 @@ def lock_axis_row(
 
 
 @inlined_kernel
-def find_room_row(approach: Any, row: Any) -> None:
+def find_room_row(approach: Any, inverse_x: Any, inverse_y: Any, row: Any) -> None:
     """Find how near to its limits a joint may come in this iteration, so that it comes to rest there softly.
 
     Parameters
     ----------
     approach : float32
         Largest share of the way from the last pose to a limit.
+    inverse_x, inverse_y : float32
+        See `LimitArrays.inverse_swing`.
     row : (JOINT_ROW,) float32
         The joint: its room is written.
     """
     for lane in range(LANES):
-        bound, last = row[SWING_BOUND + lane], row[LAST + lane]
-        radius = last + approach * max(np.sqrt(bound) - last, ZERO)
+        bound = row[SWING_BOUND + lane]
+        x, y, last = vector_at(row, LAST, lane)
+        radius = np.sqrt(x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y)
+        radius += approach * max(np.sqrt(bound) - radius, ZERO)
         low, high = row[TWIST_BOUND + lane], row[TWIST_BOUND + LANES + lane]
-        last = row[LAST + LANES + lane]
         low = max(low, last + approach * min(low - last, ZERO))
         high = min(high, last + approach * max(high - last, ZERO))
         put_vector(row, ROOM, lane, (min(radius * radius, bound), low, high))
@@ -200,22 +208,29 @@ def find_room_row(approach: Any, row: Any) -> None:
 
 @inlined_kernel
 def find_limit_row(
-    parent_frame: Quaternion, joint_frame: Quaternion, inverse_x: Any, inverse_y: Any, row: Any
+    approach: Any, parent_frame: Quaternion, joint_frame: Quaternion, inverse_x: Any, inverse_y: Any, row: Any
 ) -> bool:
-    """Find swing and twist of a joint's next rotation.
+    """Find swing and twist of a joint's next rotation, and how much of the way to that swing it goes.
 
     Parameters
     ----------
+    approach : float32
+        Largest share of the way from the last pose to a limit.
     parent_frame, joint_frame : tuple of float32
     inverse_x, inverse_y : float32
         See `LimitArrays.inverse_swing`.
     row : (JOINT_ROW,) float32
-        The joint, after `find_room_row`: next swing is written.
+        The joint, after `find_room_row`: next swing and the share of its way are written.
 
     Returns
     -------
     bool
-        Someone's joint would leave its room.
+        Someone's joint would leave its room, or goes less than its whole way.
+
+    Notes
+    -----
+    A bone that crosses a long ellipse beside the middle comes close to the limit only at the very end. So its
+    way to the limit is also measured along its motion.
     """
     is_outside = False
     for lane in range(LANES):
@@ -223,7 +238,17 @@ def find_limit_row(
         x, y, twist = split(into_limit(parent_frame, quaternion_at(row, NEXT, lane), joint_frame))
         put_vector(row, NEXT_SWING, lane, (x, y, twist))
         value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
-        is_outside |= (value > bound) | (twist > high) | (twist < low)
+        last = vector_at(row, LAST, lane)
+        u, v = last[0] * inverse_x, last[1] * inverse_y
+        du, dv = x * inverse_x - u, y * inverse_y - v
+        # The ray from the last swing through the next one leaves the ellipse at `leaving` of its way.
+        square = du * du + dv * dv + TINY
+        along = u * du + v * dv
+        left = max(ENLARGED * ENLARGED * row[SWING_BOUND + lane] - u * u - v * v, ZERO)
+        leaving = (np.sqrt(along * along + square * left) - along) / square
+        share = min(approach * leaving, ONE)
+        row[WAY_SHARE + lane] = share
+        is_outside |= (share < ONE) | (value > bound) | (twist > high) | (twist < low)
     return is_outside
 
 
@@ -303,8 +328,13 @@ def limit_row(
         x, y, twist = vector_at(row, NEXT_SWING, lane)
         bound, low, high = vector_at(row, ROOM, lane)
         held = vector_at(row, HELD, lane)
+        last = vector_at(row, LAST, lane)
+        share = row[WAY_SHARE + lane]
+        is_whole = share >= ONE
+        x = x if is_whole else last[0] + share * (x - last[0])
+        y = y if is_whole else last[1] + share * (y - last[1])
         value = x * inverse_x * x * inverse_x + y * inverse_y * y * inverse_y
-        is_inside = (value <= bound) & (twist >= low) & (twist <= high) & (is_free > ZERO)
+        is_inside = is_whole & (value <= bound) & (twist >= low) & (twist <= high) & (is_free > ZERO)
         share = np.sqrt(bound / max(value, bound))
         swing_excess, twist_excess = row[EXCESS + lane], row[EXCESS + LANES + lane]
         least = max(GRAVE * largest[lane], TINY)

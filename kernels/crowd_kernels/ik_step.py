@@ -82,7 +82,7 @@ def free_joints(tree: TreeArrays, gain: Any, bound: Any, approach: Any, joints: 
         above = joints[tree.parent[k] + 1]
         pull_row(above, gain, bound, joints[k + 1])
         if tree.is_limited[k]:
-            find_room_row(approach, joints[k + 1])
+            find_room_row(approach, tree.inverse_swing[k, 0], tree.inverse_swing[k, 1], joints[k + 1])
             for axis in range(3):
                 if tree.is_free[k, axis] == ZERO:
                     if joints[k + 1, IS_FIXED] == ZERO:
@@ -211,6 +211,7 @@ def build_system(
 @kernel
 def turn_joints(
     tree: TreeArrays,
+    approach: Any,
     joints: Any,
     effectors: Any,
     push: Any,
@@ -223,6 +224,8 @@ def turn_joints(
     Parameters
     ----------
     tree : TreeArrays
+    approach : float32
+        Largest share of the way from the last pose to a limit that a joint goes.
     joints : (K + 1, JOINT_ROW) float32
         The root and all joints.
     effectors : (E, EFFECTOR_ROW) float32
@@ -255,6 +258,7 @@ def turn_joints(
         if not tree.is_limited[k]:
             continue
         is_outside = find_limit_row(
+            approach,
             frame_of(tree.parent_frame, k),
             frame_of(tree.joint_frame, k),
             tree.inverse_swing[k, 0],
