@@ -446,7 +446,8 @@ def solve_crowd(
     freedom", 1987.
     **Differs from the source:** the pseudo-inverse is damped, and more so far from the target; joints are
     balls that are fixed along one direction at a time where they leave their limits, the gravest first, and
-    they have weights; limits are approached softly from the pose of the step before.
+    they have weights; limits are approached softly from the pose of the step before, as they lie nearest and
+    as they lie ahead.
     """
     block_count = (active.shape[0] + LANES - 1) // LANES
     for k in prange(CHUNKS):

@@ -160,7 +160,7 @@ def iterate(tree, settings, local, reference, last, point, target, target_rotati
                 )
             found.append(quaternion(after))
         is_done = True
-        for k, limit in np.argwhere((excess > 0) & (excess >= 0.3 * excess.max())):
+        for k, limit in np.argwhere((excess > 0) & (excess >= 0.6 * excess.max())):
             way = quaternion(rotation(found[k]) * rotation(local[k]).inv())
             motion = outers[k].apply(2 * way[1:] / way[0])
             normal = normals(tree, k, found[k], outers[k])[3 * limit]
@@ -168,6 +168,21 @@ def iterate(tree, settings, local, reference, last, point, target, target_rotati
         if is_done:
             break
     return np.array(found)
+
+
+def share_of_way(last, following, bound, approach):
+    """How much of the way from one swing to the next a joint goes, in units of the ellipse's semi-axes.
+
+    It goes at most a share of the way along its motion to the edge of the enlarged ellipse.
+    """
+    way = following - last
+    square = way @ way
+    middle = -(last @ way) / max(square, 1e-12)
+    nearest = last + middle * way
+    half = np.sqrt(max((1.1 * bound) ** 2 - nearest @ nearest, 0.0) / max(square, 1e-12))
+    outside = np.linalg.norm(last) > 1.1 * bound
+    leaving = middle + (abs(middle) if outside else half)
+    return min(1.0, approach * leaving)
 
 
 def inside(limits, k, local, reference, last, approach):
@@ -178,6 +193,7 @@ def inside(limits, k, local, reference, last, approach):
     low, high = min(low, held_twist), max(high, held_twist)
     bound = max(1.0, np.linalg.norm(held_swing * limits.inverse_swing[k]))
     last_swing, last_twist = split(limits, k, last)
+    share = share_of_way(last_swing * limits.inverse_swing[k], swing * limits.inverse_swing[k], bound, approach)
     value = np.linalg.norm(last_swing * limits.inverse_swing[k])
     bound = min(bound, value + approach * max(bound - value, 0))
     last = np.tan(last_twist / 2)
@@ -192,6 +208,8 @@ def inside(limits, k, local, reference, last, approach):
     swing_excess = 0.0
     if value**2 > bound**2 * (1 + 2e-5):
         swing_excess = 2 * np.linalg.norm(swing) * (1 - bound / value)
+    swing = last_swing + share * (swing - last_swing)
+    value = np.linalg.norm(swing * limits.inverse_swing[k])
     swing = swing * min(1.0, bound / max(value, 1e-12))
     swing = np.where([free_x > 0, free_y > 0], swing, held_swing)
     twist = np.clip(twist, low, high) if free_twist > 0 else held_twist
