@@ -62,7 +62,7 @@ SOLVE = SETTINGS._replace(
     reach=1e3,
     damping=0.016,
     error_damping=0.4,
-    turn_error_damping=6.0,
+    turn_error_damping=8.0,
     pull_fade=1.0,
     place_first=0,
     passes=8,  # Arms at many limits at once, far from rotations they cannot have, sway with fewer.
@@ -84,7 +84,7 @@ class ReachSettings:
     """How inverse kinematics brings hands to their targets, for iterations of `iteration_time`."""
     iteration_time: float = 1.0 / 120.0
     """Longest time that one iteration serves, s. The same number in every step keeps motions smooth."""
-    fade_rate: float = 8.0
+    fade_rate: float = 6.0
     """Rate with which turns of joints fade that the targets do not ask for, 1/s."""
     limit_rate: float = 8.0
     """Rate with which joints approach their limits at most, 1/s; larger: harder stops."""

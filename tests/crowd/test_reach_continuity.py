@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 
 from crowd.bench.reach import (
+    FASTEST,
     LARGEST_JITTER,
     LARGEST_RATIO,
+    TURNING,
+    TWIST,
     Reachers,
     angular_motion,
     example_acceleration,
     random_targets,
     random_turns,
+    run_batch,
 )
 from crowd.motion.rotation import conjugate, from_vector, multiply
 from crowd_kernels.reach_goal import HOLD, MOVING, OUT_OF_REACH, REACHED
@@ -139,6 +143,21 @@ def test_rotations_that_joints_cannot_have_are_sought_and_left_smoothly(reachers
     shown += frames(reachers, 160)
     assert not state.reach_stage.any()
     assert angular_motion(np.array(shown), reachers.simulation.dt)[1] < allowed(reachers)
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+def test_joints_slow_down_before_their_limits_wherever_they_cross_them(hand, rng):
+    """Wrists of many people cross the narrow axis of their range, in its middle and far beside it."""
+    reachers = Reachers(400, seed=0)
+    for _ in range(3):
+        reachers.step()
+    target = random_targets(reachers, hand, rng, is_far=True)
+    turned = multiply(from_vector(TWIST * random_turns(400, rng)), reachers.hand(hand)[1])
+    _, _, status, speed, acceleration, jitter = run_batch(reachers, hand, target, turned, TURNING)
+    assert (status == OUT_OF_REACH).all()
+    assert speed < FASTEST
+    assert acceleration < allowed(reachers)
+    assert jitter < LARGEST_JITTER
 
 
 def test_a_held_target_that_turns_is_followed_in_human_time(reachers, rng):
