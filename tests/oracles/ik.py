@@ -193,7 +193,9 @@ def inside(limits, k, local, reference, last, approach):
     low, high = min(low, held_twist), max(high, held_twist)
     bound = max(1.0, np.linalg.norm(held_swing * limits.inverse_swing[k]))
     last_swing, last_twist = split(limits, k, last)
-    share = share_of_way(last_swing * limits.inverse_swing[k], swing * limits.inverse_swing[k], bound, approach)
+    share = share_of_way(
+        last_swing * limits.inverse_swing[k], swing * limits.inverse_swing[k], bound, approach
+    )
     value = np.linalg.norm(last_swing * limits.inverse_swing[k])
     bound = min(bound, value + approach * max(bound - value, 0))
     last = np.tan(last_twist / 2)
