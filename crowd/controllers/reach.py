@@ -85,8 +85,8 @@ class ReachSettings:
     iteration_time: float = 1.0 / 120.0
     """Longest time that one iteration serves, s. The same number in every step keeps motions smooth."""
     fade_rate: float = 6.0
-    """Rate with which turns of joints fade that the targets do not ask for, 1/s. Where it is larger, hands stop
-    short of rotations far from the blended ones, since damped steps make up for less than fades."""
+    """Rate with which turns of joints fade that the targets do not ask for, 1/s. Where it is larger, hands
+    stop short of rotations far from the blended ones, since damped steps make up for less than fades."""
     limit_rate: float = 8.0
     """Rate with which joints approach their limits at most, 1/s; larger: harder stops."""
     tolerance: float = 7e-4
