@@ -172,18 +172,19 @@ class Tasks:
         if doing.size == 0:
             return
         self._settle(step, doing)
+        # Each person has one outcome; the first of these counts.
         ended = is_over(self, step, doing)
-        is_late = (self.until[doing] <= step.time) & ~ended
-        has_failed_now = has_failed(self, step, doing) & ~ended
-        cut_off = doing[has_no_way(self, step, doing) & ~ended]
+        is_cut_off = has_no_way(self, step, doing) & ~ended
+        has_failed_now = has_failed(self, step, doing) & ~(ended | is_cut_off)
+        is_late = (self.until[doing] <= step.time) & ~(ended | is_cut_off | has_failed_now)
         for row in doing[ended]:
             self._advance(int(row), step.time)
+        for row in doing[is_cut_off]:
+            self._break_off(int(row), step.time, Outcome.NO_WAY)
         for row in doing[has_failed_now]:
             self._retry(int(row), step.time, "the hand cannot do it")
-        for row in doing[is_late & ~has_failed_now]:
+        for row in doing[is_late]:
             self._time_out(int(row), step.time)
-        for row in cut_off:
-            self._break_off(int(row), step.time, Outcome.NO_WAY)
         for row in doing[np.isin(self.wait[doing], WAITS_FOR_SOMEBODY)]:
             if why := missing_half(self, int(row)):
                 let_go_of_everything(self, int(row))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import crowd
+from crowd.tasks.execution import MOST_ATTEMPTS
 from crowd.tasks.support import is_carried
 
 PEN = "walls = [{ points = [[-4, -4], [-2, -4], [-2, -2], [-4, -2], [-4, -4]] }]"
@@ -136,6 +137,25 @@ def test_who_is_shut_in_on_the_way_is_told_and_stops(tmp_path):
     assert told(simulation, 5.0) == [("task_failed", "pick_up", "there is no way there")]
     assert simulation.time < 1.1
     assert not simulation.state.wants_to_walk.any()
+
+
+@pytest.mark.parametrize("attempt", [0, MOST_ATTEMPTS - 1])
+@pytest.mark.parametrize(("before", "after"), [(0, 2), (7, 0)])
+def test_who_is_shut_in_just_when_the_time_is_over_is_told_once(tmp_path, attempt, before, after):
+    tasks = ["{ wait = 0.02 }"] * before + ["{ walk_to = [0.0, 4.0] }"] + ["{ wait = 0.02 }"] * after
+    boxes = TABLE + FENCE.replace(", disappear_at = OPENS", "")
+    people = person(", ".join(tasks), "[0.0, -3.0]")
+    expected = scene(tmp_path, people, boxes)
+    told(expected, 5.0)
+    simulation = scene(tmp_path, people, boxes)
+    for _ in simulation.run(seconds=0.9):
+        pass
+    simulation.tasks.attempt[0] = attempt
+    simulation.tasks.until[0] = next(event.time for event in expected.events if event.task == "walk_to")
+    wait = ("task_done", "wait", "")
+    failure = ("task_failed", "walk_to", "there is no way there")
+    assert told(simulation, 5.0) == [wait] * before + [failure] + [wait] * after
+    assert simulation.tasks.failed.tolist() == [1]
 
 
 def test_who_is_shut_in_until_a_door_opens_waits_for_it(tmp_path):
