@@ -14,6 +14,8 @@ LARGEST_SEED = 2**63 - 1
 """What the whole numbers of 64 bits hold with which random numbers are made."""
 SHOWN_BITS = 128
 """Longest whole number that messages show; Python writes no number of more than 4,300 digits at all."""
+SHOWN_LENGTH = 200
+"""Longest text of values that messages show, characters."""
 REAL_KINDS = "iufO"
 """Kinds of NumPy types that are real numbers, or objects that may be; no truth values, text, complex ones."""
 
@@ -150,10 +152,14 @@ def whole_number(what: str, value: SupportsIndex, least: int, most: int) -> int:
 
 
 def shown(value: Any) -> str:
-    """What somebody gave, in one line; of a very long number only how long it is."""
+    """What somebody gave, in one line: of a very long number its length, of long text the beginning."""
     if isinstance(value, int) and value.bit_length() > SHOWN_BITS:
         return f"a whole number of {value.bit_length()} bits"
-    return " ".join(str(value).split())
+    try:
+        text = " ".join(str(value).split())
+    except ValueError:
+        return f"{type(value).__name__} with a number too long to show"
+    return text if len(text) <= SHOWN_LENGTH else f"{text[: SHOWN_LENGTH - 3]}..."
 
 
 def checked_seconds(what: str, seconds: SupportsFloat) -> float:

@@ -198,7 +198,7 @@ class Commands:
             is_number = np.issubdtype(index.dtype, np.integer)
             if not is_number or ((index < 0) | (index >= objects.count)).any():
                 known = f"0 to {objects.count - 1}" if objects.count else "the scenario has no objects"
-                raise SettingsError(describe("look_at", "no such object", index.tolist(), known))
+                raise SettingsError(describe("look_at", "no such object", shown(object), known))
             self._require_one_or_all("look_at", "objects", index.size, rows.size)
             gaze.look_at_object(state, rows, index, trunk)
 
@@ -424,7 +424,7 @@ class Commands:
             return objects.index(item)
         if not isinstance(item, int | np.integer) or not 0 <= item < objects.count:
             allowed = f"0 to {objects.count - 1}" if objects.count else "the scenario has no objects"
-            raise SettingsError(describe(what, "no such object", item, allowed))
+            raise SettingsError(describe(what, "no such object", shown(item), allowed))
         return item
 
     def _sides(
