@@ -285,7 +285,7 @@ CASES = [
         turn,
         check_turn,
         reset=copy_poses,
-        bound_us=0.3,
+        bound_us=0.28,
     ),
     Case("gaze: eyes of others", SIZES, set_up, find_eyes, check_eyes),
     Case("gaze: saccades", SIZES, set_up, jump, check_jump, bound_us=0.05),

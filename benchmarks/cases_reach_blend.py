@@ -17,7 +17,7 @@ from crowd_kernels.aligned import aligned_copy, aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.reach import CHUNKS, reach_crowd
-from crowd_kernels.reach_blend import CHAIN, LANES, SAME_PLACE, SCRATCH_ROW
+from crowd_kernels.reach_blend import CHAIN, JOINTS, SAME_PLACE, SCRATCH_ROW
 from crowd_kernels.reach_goal import ReachState
 from crowd_kernels.reach_space import NEAREST
 
@@ -248,7 +248,7 @@ def nearest_weights(hands: MovingHands, target: FloatArray) -> FloatArray:
 def blend(hands: MovingHands, weight: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotations (N, J, 4) and pelvis (N, 3) of weighted examples (N, E) on their way to the apex."""
     keys = hands.reachers.space.keys
-    rotation, pelvis = np.zeros((len(weight), 4 * LANES)), np.zeros((len(weight), 3))
+    rotation, pelvis = np.zeros((len(weight), 4 * JOINTS)), np.zeros((len(weight), 3))
     for clip in range(weight.shape[1]):
         rows = np.flatnonzero(weight[:, clip] > 0.0)
         place = course[rows] * keys.apex[clip]
@@ -257,7 +257,7 @@ def blend(hands: MovingHands, weight: FloatArray, course: FloatArray) -> tuple[F
         key, own = keys.first_key[clip] + before, weight[rows, clip][:, None]
         rotation[rows] += own * ((1.0 - later) * keys.rotation[key] + later * keys.rotation[key + 1])
         pelvis[rows] += own * ((1.0 - later) * keys.pelvis[key] + later * keys.pelvis[key + 1])
-    rotation = rotation.reshape(-1, 4, LANES)[:, :, : len(keys.joint)].transpose(0, 2, 1)
+    rotation = rotation.reshape(-1, 4, JOINTS)[:, :, : len(keys.joint)].transpose(0, 2, 1)
     return rotation / np.linalg.norm(rotation, axis=2, keepdims=True), pelvis
 
 

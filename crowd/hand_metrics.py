@@ -56,7 +56,7 @@ class HandMetrics:
 
     def _observe_objects(self, simulation: Simulation) -> None:
         objects = simulation.objects
-        apart = simulation.grab.holding.apart()
+        apart = simulation.grab.holding.apart(simulation.state)
         if apart.size:
             self._was_held = True
             self._apart = max(self._apart, float(apart.max()))

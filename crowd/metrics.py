@@ -15,6 +15,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from crowd.hand_metrics import HandMetrics
+from crowd_kernels.gait import HEEL
 
 if TYPE_CHECKING:
     from crowd.recording import Recording
@@ -35,8 +36,6 @@ SLOWEST = 0.3
 """Speeds below this are too small for a relative error, m/s."""
 SHORTEST_STANCE = 0.05
 """Contacts shorter than this are no stances, s."""
-HEEL = 1
-"""Contact of a foot whose heel alone is planted."""
 FULL_TURN = 2.0 * np.pi
 
 

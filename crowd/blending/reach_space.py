@@ -20,7 +20,7 @@ from crowd.motion.rotation import multiply, rotate
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd_kernels.aligned import aligned_copy, aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.reach_blend import LANES, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
+from crowd_kernels.reach_blend import JOINTS, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
 from crowd_kernels.reach_space import (
     BLENDED,
     BLOCK,
@@ -191,17 +191,20 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
     """Sample all examples and keep the joints that reaches write."""
     groups = {joint: group_of(name) for joint, name in enumerate(skeleton.joint_names)}
     joints = [joint for joint, group in groups.items() if group is not None]
-    if len(joints) > LANES:
-        raise MotionError(describe("reach", "too many joints of the body", len(joints), f"at most {LANES}"))
+    if len(joints) > JOINTS:
+        raise MotionError(describe("reach", "too many joints of the body", len(joints), f"at most {JOINTS}"))
     clips = [clip for part in sets for clip in part]
     sampled = [sample_keys(clip, KEY_RATE) for clip in clips]
     count = np.array([len(rotation) for rotation, _ in sampled], np.int32)
     first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
     padded = rows(np.concatenate([rotation[:, joints] for rotation, _ in sampled]))
-    rotation = padded.reshape(-1, 4, PADDED_JOINTS)[:, :, :LANES].reshape(-1, ROW)
+    rotation = padded.reshape(-1, 4, PADDED_JOINTS)[:, :, :JOINTS].reshape(-1, ROW)
     pelvis = np.concatenate([pelvis for _, pelvis in sampled]).astype(np.float32)
     apex_time = np.array([clip.reach.apex for clip in clips if clip.reach is not None])
     end_time = np.array([clip.duration for clip in clips])
+    member = np.zeros((4, JOINTS), np.float32)
+    for place, joint in enumerate(joints):
+        member[groups[joint], place] = 1.0
     starts = np.cumsum([0, *(len(part) for part in sets)])[:-1]
     chains = np.array([arm_chain(skeleton, side) for side in SIDES])
     return ReachKeys(
@@ -215,7 +218,7 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
         np.ascontiguousarray(pelvis[first[starts]], np.float64),
         int(sum(len(part) for part in sets[: len(SIDES)])),
         np.array(joints, np.int32),
-        np.array([groups[joint] for joint in joints] + [LOWER] * (LANES - len(joints)), np.int32),
+        aligned_copy(member.ravel()),
         np.array([[joints.index(joint) for joint in chain] for chain in chains], np.int32),
         np.searchsorted(np.unique(chains), chains).astype(np.int32),
         np.ascontiguousarray(skeleton.offset[chains]),
@@ -245,7 +248,7 @@ def apex_examples(
     label = clips[0].reach
     side = label.side if label is not None else SIDES[0]
     row = (1.0 - share) * keys.rotation[before] + share * keys.rotation[after]
-    rotation = row.reshape(-1, 4, LANES)[:, :, keys.chain[SIDES.index(side)]].transpose(0, 2, 1)
+    rotation = row.reshape(-1, 4, JOINTS)[:, :, keys.chain[SIDES.index(side)]].transpose(0, 2, 1)
     rotation = rotation / np.linalg.norm(rotation, axis=2, keepdims=True)
     pelvis = (1.0 - share) * keys.pelvis[before] + share * keys.pelvis[after]
     position = hand_position(skeleton, side, rotation, pelvis)

@@ -107,7 +107,7 @@ class GazeSettings:
     """Relative part of the eyes in the turn, > 0."""
     eye_pitch: float = math.radians(35.0)
     eye_heading: float = math.radians(40.0)
-    """Half axes of the ellipse in which eyes turn."""
+    """Half axes of the ellipse in which eyes turn, less than a right angle."""
     eye_speed: float = math.radians(700.0)
     """Largest speed of the eyes against the head, saccades apart; above that of any human eye."""
     head_speed: float = math.radians(180.0)

@@ -28,7 +28,6 @@ class Holding:
         self.objects = objects
         self._joints = joints
         self._hand_joint = np.array([skeleton.joint(f"{side}_hand") for side in SIDES], np.int32)
-        self._followed: tuple[npt.NDArray[np.intp], FloatArray] = np.zeros(0, np.intp), np.zeros((0, 3))
 
     def hands_in_world(self, state: State, hands: Hands) -> Frames:
         """Where hand joints are, by the last computed joints."""
@@ -94,7 +93,6 @@ class Holding:
         """Move held objects with hands; between two hands they take the middle of what both ask for."""
         objects = self.objects
         items, (place, turn) = self._asked_by_hands(state)
-        self._followed = items, place
         if items.size == 0:
             return
         objects.position_world[items], objects.rotation_world[items] = place, turn
@@ -105,10 +103,11 @@ class Holding:
             objects.position_world[items[second]] = 0.5 * (place[second] + place[second - 1])
             objects.rotation_world[items[second]] = middle / np.linalg.norm(middle, axis=1, keepdims=True)
 
-    def apart(self) -> FloatArray:
-        """How far objects are from where each hand had its grip when they last followed, m. (A,)"""
-        items, place = self._followed
-        return np.asarray(np.linalg.norm(self.objects.position_world[items] - place, axis=1))
+    def apart(self, state: State) -> FloatArray:
+        """How far objects are from where each hand that holds them has its grip, m. (A,)"""
+        items, (place, _) = self._asked_by_hands(state)
+        away = self.objects.position_world.take(items, axis=0) - place
+        return np.asarray(np.sqrt(np.einsum("ak,ak->a", away, away)))
 
     def _asked_by_hands(self, state: State) -> tuple[npt.NDArray[np.intp], Frames]:
         """Held objects, once for each hand that holds them, and where the hands ask them to be."""

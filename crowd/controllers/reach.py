@@ -68,8 +68,8 @@ SOLVE = SETTINGS._replace(
     passes=8,  # Arms at many limits at once, far from rotations they cannot have, sway with fewer.
 )
 EFFECTORS = ("right_hand", "left_hand")
-PARTS = attrgetter(*(f"reach_{name}" for name in ReachState._fields))
-"""Fields of the state that the kernels of reaches change."""
+read_parts = attrgetter(*(f"reach_{name}" for name in ReachState._fields))
+"""Reads the fields of a state that the kernels of reaches change."""
 FEWEST_EXAMPLES = 8
 """A library with fewer reaches of a hand takes the built-in ones."""
 
@@ -307,7 +307,7 @@ class Reach:
             return
         self._follow_moved(state, reaching)
         begins = (state.reach_stage == MOVE) & (state.reach_course == 0.0)
-        parts = ReachState(*PARTS(state))
+        parts = ReachState(*read_parts(state))
         begin = time.perf_counter()
         reach_crowd(
             self.space.arrays,

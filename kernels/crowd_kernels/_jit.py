@@ -105,7 +105,11 @@ def _with_globals(function: Callable[P, R], **values: bool) -> Callable[P, R]:
     """Copy a function that sees other values of some globals of its module."""
     assert isinstance(function, FunctionType)
     copy = FunctionType(
-        function.__code__, function.__globals__ | values, function.__name__, None, function.__closure__
+        function.__code__,
+        function.__globals__ | values,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
     )
     copy.__module__, copy.__qualname__, copy.__doc__ = (
         function.__module__,

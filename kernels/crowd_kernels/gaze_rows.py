@@ -183,7 +183,7 @@ def begin_row(pelvis: Any, carry: Any, frequency: Any, decay: Any, dt: Any) -> N
 
 @inlined_kernel
 def frame_below(row: Any, carry: Any, x: Any, y: Any, z: Any, lane: int) -> Any:
-    """Find rotation and position of a joint below the carried frame, in the pose of the layers below."""
+    """Find rotation and position of a joint below the carried frame, turned as its row tells."""
     scale = row[SCALE + lane]
     w = carry[ROTATION + lane]
     i = carry[ROTATION + LANES + lane]

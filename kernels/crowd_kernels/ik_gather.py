@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from crowd_kernels._jit import inlined_kernel, kernel
+from crowd_kernels._jit import kernel
 from crowd_kernels.ik_layout import (
     FRAME,
     LENGTH,
@@ -48,37 +48,6 @@ def is_sound(place: Any, square: Any, point: Any, wants_place: bool, wants_frame
     if wants_frame and not (square > LEAST_SQUARE and square < ONE / LEAST_SQUARE):
         return False
     return bool(np.isfinite(total))
-
-
-@inlined_kernel
-def begin_length_row(row: Any) -> None:
-    """Begin the length of an effector's chain with the distance of the effector from its joint.
-
-    Parameters
-    ----------
-    row : (EFFECTOR_ROW,) float32
-        The effector: its length is written.
-    """
-    for lane in range(LANES):
-        point = vector_at(row, POINT, lane)
-        row[LENGTH + lane] = np.sqrt(dot(point, point))
-
-
-@inlined_kernel
-def add_length_row(offset: Any, scale: Any, row: Any) -> None:
-    """Lengthen the chain of an effector by the way from a joint's parent to the joint.
-
-    Parameters
-    ----------
-    offset : float32
-        Length of the joint's rest offset, m.
-    scale : (16,) float32
-        Proportions of its segment.
-    row : (EFFECTOR_ROW,) float32
-        The effector: its length is changed.
-    """
-    for lane in range(LANES):
-        row[LENGTH + lane] += offset * scale[lane]
 
 
 @kernel
@@ -144,12 +113,15 @@ def gather_effectors(
         if tree.root_weight > 0.0:
             row[LENGTH : LENGTH + LANES] = FAR
             continue
-        begin_length_row(row)
+        for lane in range(LANES):
+            reach = vector_at(row, POINT, lane)
+            row[LENGTH + lane] = np.sqrt(dot(reach, reach))
         k = tree.effector[e]
         while k >= 0 and k != tree.base[e]:
             x, y, z = tree.offset[k, 0], tree.offset[k, 1], tree.offset[k, 2]
-            part = tree.segment[k] * LANES
-            add_length_row(np.sqrt(x * x + y * y + z * z), scale[part : part + LANES], row)
+            own = np.sqrt(x * x + y * y + z * z)
+            for lane in range(LANES):
+                row[LENGTH + lane] += own * scale[tree.segment[k] * LANES + lane]
             k = tree.parent[k]
     return parts
 
@@ -186,7 +158,8 @@ def gather_joints(
     out_scale : (G * 16,) float32
         Written.
     out_joints : (K + 1, JOINT_ROW) float32
-        Written: the pose as next rotations.
+        Written: the pose as next rotations, the reference, bounds and last values of limits; frames are used
+        for the last pose, and what is left of them has no meaning.
 
     Notes
     -----

@@ -20,7 +20,7 @@ from crowd_kernels.quaternion import (
 )
 from crowd_kernels.reach_blend import (
     CHAIN,
-    LANES,
+    JOINTS,
     ROW,
     ReachKeys,
     blend_body,
@@ -237,11 +237,11 @@ def aim_hand(
         unit_row(row)
         apex_body = add(scaled(moved, leg), scaled(live_pelvis, upper_share))
         apex_rotation = slerp(
-            (float(row[0]), float(row[LANES]), float(row[2 * LANES]), float(row[3 * LANES])),
+            (float(row[0]), float(row[JOINTS]), float(row[2 * JOINTS]), float(row[3 * JOINTS])),
             live_rotation,
             upper_share,
         )
-        apex, apex_turned = place_hand(keys, arm, scale, apex_body, apex_rotation, row, LANES)
+        apex, apex_turned = place_hand(keys, arm, scale, apex_body, apex_rotation, row, JOINTS)
         miss = shortened(subtract(goal, add(apex, rotate(apex_turned, point))), farthest)
         target = add(here, scaled(miss, risen))
         # A trunk that is shared with the other hand does not do what was foreseen.

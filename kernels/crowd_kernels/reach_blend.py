@@ -27,10 +27,10 @@ from crowd_kernels.reach_goal import (
 from crowd_kernels.reach_space import NEAREST, SCRATCH, ReachArrays, weigh_examples
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
-LANES = 24
-ROW = 4 * LANES
+JOINTS = 24
+ROW = 4 * JOINTS
 """Length of a compact pose row: components outermost, 24 joints each."""
-SCRATCH_ROW = 3 * ROW + LANES
+SCRATCH_ROW = 3 * ROW + JOINTS
 """Length of a chunk's scratch row for `reach_crowd`."""
 SLOTS = 24
 """Most examples that are blended for one hand."""
@@ -72,8 +72,8 @@ class ReachKeys(NamedTuple):
     """First example of the seated sets."""
     joint: npt.NDArray[np.int32]
     """(J,) Skeleton joint of each compact joint."""
-    group: npt.NDArray[np.int32]
-    """(24,) Group of each compact joint; the last ones are spare."""
+    group: npt.NDArray[np.float32]
+    """(96,) 1 where a compact joint belongs to a group, else 0; in the order of the groups."""
     chain: npt.NDArray[np.int32]
     """(2, 9) Compact joints from pelvis to right and left hand."""
     chain_place: npt.NDArray[np.int32]
@@ -379,18 +379,18 @@ def unit_row(row: Any) -> None:
     row : (96,) float32
         In and out; quaternions without length become the identity.
     """
-    for lane in range(LANES):
+    for lane in range(JOINTS):
         w = row[lane]
-        x = row[LANES + lane]
-        y = row[2 * LANES + lane]
-        z = row[3 * LANES + lane]
+        x = row[JOINTS + lane]
+        y = row[2 * JOINTS + lane]
+        z = row[3 * JOINTS + lane]
         square = w * w + x * x + y * y + z * z
         scale = ONE / np.sqrt(square)
         is_lost = square < TINY
         row[lane] = ONE if is_lost else w * scale
-        row[LANES + lane] = ZERO if is_lost else x * scale
-        row[2 * LANES + lane] = ZERO if is_lost else y * scale
-        row[3 * LANES + lane] = ZERO if is_lost else z * scale
+        row[JOINTS + lane] = ZERO if is_lost else x * scale
+        row[2 * JOINTS + lane] = ZERO if is_lost else y * scale
+        row[3 * JOINTS + lane] = ZERO if is_lost else z * scale
 
 
 @inlined_kernel
@@ -467,9 +467,9 @@ def read_joints(keys: ReachKeys, pose: Any, out_row: Any) -> None:
     for k in range(keys.joint.shape[0]):
         joint = keys.joint[k]
         out_row[k] = pose[joint]
-        out_row[LANES + k] = pose[PADDED_JOINTS + joint]
-        out_row[2 * LANES + k] = pose[2 * PADDED_JOINTS + joint]
-        out_row[3 * LANES + k] = pose[3 * PADDED_JOINTS + joint]
+        out_row[JOINTS + k] = pose[PADDED_JOINTS + joint]
+        out_row[2 * JOINTS + k] = pose[2 * PADDED_JOINTS + joint]
+        out_row[3 * JOINTS + k] = pose[3 * PADDED_JOINTS + joint]
 
 
 @inlined_kernel
@@ -480,9 +480,9 @@ def write_joints(keys: ReachKeys, row: Any, rest: Any, pose: Any) -> None:
             continue
         joint = keys.joint[k]
         pose[joint] = row[k]
-        pose[PADDED_JOINTS + joint] = row[LANES + k]
-        pose[2 * PADDED_JOINTS + joint] = row[2 * LANES + k]
-        pose[3 * PADDED_JOINTS + joint] = row[3 * LANES + k]
+        pose[PADDED_JOINTS + joint] = row[JOINTS + k]
+        pose[2 * PADDED_JOINTS + joint] = row[2 * JOINTS + k]
+        pose[3 * PADDED_JOINTS + joint] = row[3 * JOINTS + k]
 
 
 @inlined_kernel
@@ -491,17 +491,20 @@ def share_row(group: Any, lower: Any, upper: Any, right: Any, left: Any, out_sha
 
     Parameters
     ----------
-    group : (24,) int32
+    group : (96,) float32
         See `ReachKeys.group`.
     lower, upper, right, left : float32
         Shares of the groups.
     out_share : (24,) float32
         Written.
     """
-    for lane in range(LANES):
-        own = group[lane]
-        arms = right if own == RIGHT_ARM else left
-        out_share[lane] = lower if own == LOWER else (upper if own == UPPER else arms)
+    for lane in range(JOINTS):
+        out_share[lane] = (
+            lower * group[LOWER * JOINTS + lane]
+            + upper * group[UPPER * JOINTS + lane]
+            + right * group[RIGHT_ARM * JOINTS + lane]
+            + left * group[LEFT_ARM * JOINTS + lane]
+        )
 
 
 @inlined_kernel
@@ -516,17 +519,20 @@ def add_group_row(row: Any, live: Any, share: Any, out_sum: Any) -> None:
     out_sum : (96,) float32
         In and out.
     """
-    for lane in range(LANES):
-        w, x = row[lane], row[LANES + lane]
-        y, z = row[2 * LANES + lane], row[3 * LANES + lane]
+    for lane in range(JOINTS):
+        w, x = row[lane], row[JOINTS + lane]
+        y, z = row[2 * JOINTS + lane], row[3 * JOINTS + lane]
         cosine = (
-            w * live[lane] + x * live[LANES + lane] + y * live[2 * LANES + lane] + z * live[3 * LANES + lane]
+            w * live[lane]
+            + x * live[JOINTS + lane]
+            + y * live[2 * JOINTS + lane]
+            + z * live[3 * JOINTS + lane]
         )
         own = -share[lane] if cosine < ZERO else share[lane]
         out_sum[lane] += own * w
-        out_sum[LANES + lane] += own * x
-        out_sum[2 * LANES + lane] += own * y
-        out_sum[3 * LANES + lane] += own * z
+        out_sum[JOINTS + lane] += own * x
+        out_sum[2 * JOINTS + lane] += own * y
+        out_sum[3 * JOINTS + lane] += own * z
 
 
 @inlined_kernel
@@ -542,16 +548,16 @@ def complete_row(live: Any, rest: Any, row: Any) -> None:
     row : (96,) float32
         In and out.
     """
-    for lane in range(LANES):
+    for lane in range(JOINTS):
         w = row[lane] + rest[lane] * live[lane]
-        x = row[LANES + lane] + rest[lane] * live[LANES + lane]
-        y = row[2 * LANES + lane] + rest[lane] * live[2 * LANES + lane]
-        z = row[3 * LANES + lane] + rest[lane] * live[3 * LANES + lane]
+        x = row[JOINTS + lane] + rest[lane] * live[JOINTS + lane]
+        y = row[2 * JOINTS + lane] + rest[lane] * live[2 * JOINTS + lane]
+        z = row[3 * JOINTS + lane] + rest[lane] * live[3 * JOINTS + lane]
         scale = ONE / np.sqrt(max(w * w + x * x + y * y + z * z, TINY))
         row[lane] = w * scale
-        row[LANES + lane] = x * scale
-        row[2 * LANES + lane] = y * scale
-        row[3 * LANES + lane] = z * scale
+        row[JOINTS + lane] = x * scale
+        row[2 * JOINTS + lane] = y * scale
+        row[3 * JOINTS + lane] = z * scale
 
 
 @inlined_kernel

@@ -92,6 +92,15 @@ def test_things_high_and_low_are_grasped(pickers: Simulation) -> None:
     assert np.linalg.norm(away, axis=1).max() < 0.003, "nothing moves while it is grasped"
 
 
+def test_the_figure_of_a_run_tells_of_things_that_came_off_their_hands(pickers: Simulation) -> None:
+    place = pickers.objects.position_world
+    before = place[2].copy()
+    place[2] += (0.0, 0.008, 0.0)
+    pickers.metrics.observe(pickers)
+    place[2] = before
+    assert pickers.metrics.as_dict()["held.apart_mm.max"] == pytest.approx(8.0, abs=0.5)
+
+
 def test_things_are_carried_and_put_down_where_asked(pickers: Simulation) -> None:
     state, objects = pickers.state, pickers.objects
     rows = np.arange(6)

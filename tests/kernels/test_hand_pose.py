@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from crowd.motion.easing import minimum_jerk
-from crowd_kernels import _jit
-from crowd_kernels.aligned import aligned_zeros
+from crowd_kernels.aligned import aligned_full
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.grasp import CHUNKS
 from crowd_kernels.hand_pose import FINGER_ROW, compose_frames, hands_in_world, pose_hands
@@ -19,7 +18,7 @@ def random_pose(rng, count):
     return (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).reshape(count, -1).astype(np.float32)
 
 
-SCRATCH = aligned_zeros((CHUNKS, FINGER_ROW), np.float32)
+SCRATCH = aligned_full((CHUNKS, FINGER_ROW), np.nan, np.float32)
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.4, 1.0])
@@ -84,15 +83,14 @@ def test_frames_are_chained_and_taken_apart(is_inverse, rng):
     assert np.allclose(back, inner, atol=1e-12)
 
 
-def test_threads_do_not_change_a_bit(rng):
+def test_one_chunk_after_another_takes_one_scratch_row_and_all_at_once_their_own(rng):
     pose, closure = random_pose(rng, 200), rng.uniform(0, 1, (200, 2, 15)).astype(np.float32)
     rows, item = np.arange(200, dtype=np.int32), rng.integers(-1, 3, (200, 2)).astype(np.int32)
-    style = rng.integers(0, 2, (200, 2)).astype(np.int32)
-    results = []
-    for threads in (1, min(2, _jit.maximum_thread_count())):
-        _jit.set_thread_count(threads)
-        own = pose.copy()
-        pose_hands(HAND, item, style, 0.1, rows, closure, SCRATCH, np.full((200, 2), 0.6), own)
+    style, results = rng.integers(0, 2, (200, 2)).astype(np.int32), []
+    for build, used in ((pose_hands.serial, 1), (pose_hands.threaded, CHUNKS)):
+        scratch, own = np.full_like(SCRATCH, np.nan), pose.copy()
+        build(HAND, item, style, 0.1, rows, closure, scratch, np.full((200, 2), 0.6), own)
+        assert np.isfinite(scratch).any(axis=1).sum() == used
         results.append(own)
-    _jit.set_thread_count(1)
+    assert np.isfinite(results[0]).all()
     assert np.array_equal(*results)

@@ -14,6 +14,7 @@ from crowd_kernels import (
     _jit,
     clip,
     gaze_rows,
+    hand_pose,
     ik_accumulate,
     ik_effector,
     ik_joint,
@@ -21,6 +22,7 @@ from crowd_kernels import (
     ik_system,
     lanes,
     pose,
+    reach_blend,
 )
 
 FEATURES = binding.get_host_cpu_features()
@@ -76,6 +78,14 @@ ARITHMETIC_LEAVES |= {
     ik_limit.excess_row: (*[NUMBER] * 3, ROW, ROW),
     ik_limit.limit_row: (ROW, NUMBER, QUATERNION, QUATERNION, *[NUMBER] * 5, ROW, ROW, ROW, ROW),
     ik_system.subtract_block: (ROW, ROW, ROW),
+}
+ARITHMETIC_LEAVES |= {
+    hand_pose.turn_fingers_row: (ROW, ROW, ROW),
+    reach_blend.blend_row: (ROW, ROW, NUMBER, NUMBER, ROW),
+    reach_blend.unit_row: (ROW,),
+    reach_blend.share_row: (ROW, *[NUMBER] * 4, ROW),
+    reach_blend.add_group_row: (ROW, ROW, ROW, ROW),
+    reach_blend.complete_row: (ROW, ROW, ROW),
 }
 SHUFFLE_LEAVES = {
     lanes.interleave: (ROW, ROW, ROW, ROW, INTEGER, ROW),
