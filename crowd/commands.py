@@ -37,6 +37,8 @@ class Commands:
     def set_goal(self, characters: Characters, goal_world: npt.ArrayLike, radius: float = 0.3) -> None:
         """Send characters to a point; it replaces what is left of their goal lists.
 
+        Who sits stands up first.
+
         Parameters
         ----------
         characters : int, slice or sequence of int
@@ -72,12 +74,15 @@ class Commands:
                 raise SettingsError(
                     describe("set_goal", f"character {row} finds no way to its goal", goal[[0, 2]].tolist())
                 )
+        simulation.sitting.stand(simulation.state, rows)
         simulation.population.send(
             simulation.state, rows, np.ascontiguousarray(goals), np.full(rows.size, radius)
         )
 
     def set_locomotion(self, characters: Characters, parameters: npt.ArrayLike) -> None:
         """Command forward speed, turn rate and side speed directly; steering is ignored until `release`.
+
+        Who sits stands up first.
 
         Parameters
         ----------
@@ -88,7 +93,8 @@ class Commands:
         """
         rows = self._rows(characters)
         values = vectors("set_locomotion", "parameter vector", parameters, rows.size)
-        state = self._simulation.state
+        simulation, state = self._simulation, self._simulation.state
+        simulation.sitting.stand(state, rows)
         state.is_directed[rows] = True
         state.directed_parameter[rows] = values
 

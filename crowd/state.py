@@ -369,6 +369,11 @@ class State:
         """Number of slots."""
         return int(self.is_active.shape[0])
 
+    @property
+    def is_off_feet(self) -> BoolArray:
+        """Who sits, sits down or stands up. (character,)"""
+        return self.is_seated | (self.sitting_time > 0.0)
+
     def arrays(self) -> Iterator[tuple[str, npt.NDArray[Any]]]:
         """Names and arrays of all fields, in declared order."""
         for declared in fields(self):

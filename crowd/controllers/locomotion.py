@@ -77,13 +77,15 @@ class Locomotion:
     def command(self, step: Step) -> None:
         """Turn desired velocities into parameters inside the hull, and advance gait state and phase."""
         state, people = step.state, step.model.people
+        # Who stands up first neither turns nor moves on the seat.
+        stands = ~state.is_off_feet
         wish_crowd(
             state.yaw,
             state.position_world,
             state.way_point_world,
             state.desired_velocity_world,
-            state.wants_to_walk,
-            state.is_directed,
+            state.wants_to_walk & stands,
+            state.is_directed & stands,
             state.directed_parameter,
             people.stride_scale,
             people.tempo,

@@ -51,7 +51,7 @@ class Sitting:
     def evaluate(self, step: Step) -> None:
         """Advance those who sit down or stand up, and write the pose of all who do not stand."""
         state, table = step.state, step.model.clip_table
-        sitting = step.active[state.is_seated[step.active] | (state.sitting_time[step.active] > 0.0)]
+        sitting = step.active[state.is_off_feet[step.active]]
         if sitting.size == 0:
             return
         clip = table.index(self.settings.clip)

@@ -93,7 +93,7 @@ class Navigator:
             self._mobility,
         )
         # Nobody is pushed off a seat, or steps aside from there.
-        sits = state.is_seated | (state.sitting_time > 0.0)
+        sits = state.is_off_feet
         self._mobility[sits] = 0.0
         np.maximum(HASTE * self._wanted_speed, SHORTEST_MAXIMUM_SPEED, out=self._maximum_speed)
         self.avoidance.steer(

@@ -269,6 +269,26 @@ def test_people_sit_on_seats_and_stand_up_to_walk(tmp_path):
     assert not simulation.state.is_seated[0]
 
 
+@pytest.mark.parametrize("command", ["set_goal", "set_locomotion"])
+def test_who_sits_and_is_sent_away_stands_up_and_then_walks(tmp_path, command):
+    simulation = scene(tmp_path, person("ann", 1.0, -1.0, '{ sit = "stool" }'))
+    finish(simulation, 60.0)
+    state = simulation.state
+    seat = np.array([*state.position_world[0], state.yaw[0]])
+    if command == "set_goal":
+        simulation.commands.set_goal(0, (0.0, 0.5))
+    else:
+        simulation.commands.set_locomotion(0, (1.0, 0.0, 0.0))
+    for _ in simulation.run(seconds=10.0):
+        if state.sitting_time[0] > 0.0:
+            np.testing.assert_allclose([*state.position_world[0], state.yaw[0]], seat, atol=0.02)
+        if np.linalg.norm(state.position_world[0] - seat[:3]) > 2.0:
+            break
+    assert np.linalg.norm(state.position_world[0] - seat[:3]) > 2.0
+    assert not state.is_seated[0]
+    assert state.sitting_time[0] == 0.0
+
+
 def test_a_point_is_touched_with_the_finger_tips(tmp_path):
     simulation = scene(tmp_path, person("ann", 0.0, 0.0, "{ touch = [0.5, 0.9, 2.2], seconds = 0.5 }"))
     nearest = np.inf
