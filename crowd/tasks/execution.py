@@ -76,6 +76,8 @@ class Tasks:
         Heading there, rad.
     has_place : (N,) bool
         The place is taken until the task ends.
+    has_changed : (N,) bool
+        Something of the list was done since it began, and was not so already.
     done, failed : (N,) int32
         Tasks that were done, and that failed for good.
     claimed_by : (M,) int32
@@ -109,6 +111,7 @@ class Tasks:
         self.place_world: FloatArray = np.zeros((capacity, 3))
         self.place_yaw: FloatArray = np.zeros(capacity)
         self.has_place: BoolArray = np.zeros(capacity, np.bool_)
+        self.has_changed: BoolArray = np.zeros(capacity, np.bool_)
         self.done: IntArray = np.zeros(capacity, np.int32)
         self.failed: IntArray = np.zeros(capacity, np.int32)
         self.claimed_by: IntArray = np.full(model.objects.count, -1, np.int32)
@@ -128,6 +131,7 @@ class Tasks:
         """Start the lists of people who have just entered."""
         self.index[rows] = 0
         self.has_place[rows] = False
+        self.has_changed[rows] = False
         self._rewind(rows)
         busy = rows[self.has_more(rows)]
         self.simulation.state.is_finished[busy] = False
@@ -205,6 +209,7 @@ class Tasks:
             program = PROGRAMS[TaskKind(int(self.lists.kind[row, self.index[row]]))]
             self.move[row] = 0 if self.move[row] == RESTING else self.move[row] + 1
             if self.move[row] >= len(program):
+                self.has_changed[row] = True
                 self._finish(row, time)
                 return
             move = program[self.move[row]]
@@ -265,7 +270,7 @@ class Tasks:
     def _give_up(self, row: int, time: float, why: str) -> None:
         self.events.add(time, row, EventKind.TASK_FAILED, self.present(row), why)
         self.failed[row] += 1
-        self._next(row)
+        self._next(row, time)
 
     def present(self, row: int) -> str:
         """Action of a person's present task."""
@@ -274,17 +279,20 @@ class Tasks:
     def _finish(self, row: int, time: float) -> None:
         self.events.add(time, row, EventKind.TASK_DONE, self.present(row))
         self.done[row] += 1
-        self._next(row)
+        self._next(row, time)
 
-    def _next(self, row: int) -> None:
-        """Go on to the next task of the list."""
+    def _next(self, row: int, time: float) -> None:
+        """Go on to the next task; a list of which nothing could be done rests before it begins again."""
         self.has_place[row] = False
         rows = np.array([row], np.int32)
         self.index[row] += 1
         placed, state = self.simulation.model.placed, self.simulation.state
+        self._rewind(rows)
         if self.index[row] >= self.lists.count[row] and placed.repeats_goals[row]:
             self.index[row] = 0
-        self._rewind(rows)
+            if not self.has_changed[row]:
+                self._rest(row, time + LOOK_AGAIN_AFTER)
+            self.has_changed[row] = False
         if self.index[row] >= self.lists.count[row]:
             state.is_finished[row] = True
             state.is_active[row] = not placed.leaves_at_goal[row]

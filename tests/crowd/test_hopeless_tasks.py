@@ -131,6 +131,31 @@ def test_who_is_shut_in_is_told_once_for_each_task(tmp_path):
     ]
 
 
+@pytest.mark.parametrize(
+    ("tasks", "each_time"),
+    [
+        ("{ walk_to = [0.0, 0.0] }, { walk_to = [1.0, 0.0] }", ["walk_to", "walk_to"]),
+        ('{ pick_up = "boulder" }', ["pick_up"]),
+        ("{ put_down = [0.0, 0.0, 0.0] }", ["put_down"]),
+    ],
+)
+def test_a_hopeless_list_that_repeats_is_told_once_a_second(tmp_path, tasks, each_time):
+    people = person(tasks, "[-3.0, -3.0]") + "repeat = true\n"
+    simulation = scene(tmp_path, people, walls=PEN)
+    for _ in simulation.run(seconds=3.5):
+        pass
+    assert [event.task for event in simulation.events] == each_time * 4
+    assert simulation.tasks.failed.tolist() == [len(each_time) * 4]
+
+
+def test_a_list_that_repeats_begins_again_at_once_where_something_is_done(tmp_path):
+    people = person("{ walk_to = [0.0, 0.0] }, { wait = 0.1 }", "[-3.0, -3.0]") + "repeat = true\n"
+    simulation = scene(tmp_path, people, walls=PEN)
+    for _ in simulation.run(seconds=2.0):
+        pass
+    assert simulation.tasks.done[0] >= 10
+
+
 def test_who_is_shut_in_on_the_way_is_told_and_stops(tmp_path):
     boxes = TABLE + FENCE.replace(", disappear_at = OPENS", "")
     simulation = scene(tmp_path, person('{ pick_up = "can" }', "[0.0, -3.0]"), boxes)
