@@ -180,7 +180,12 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except RecordingError:
+            # What went wrong first is told.
+            if error is None:
+                raise
 
     def _write(self) -> None:
         """Append the gathered frames. The time column comes last: what it holds is complete."""

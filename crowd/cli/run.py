@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -169,8 +169,10 @@ def _advance(
     frame_count = max(1, round((seconds or simulation.scenario.seconds) / simulation.dt))
     begin = time.perf_counter()
     request = StopRequest()
-    frames = _frames(simulation, frame_count, camera, is_shown=is_shown)
-    try:
+    with ExitStack() as opened:
+        for sink in sinks:
+            opened.enter_context(sink)
+        frames = opened.enter_context(closing(_frames(simulation, frame_count, camera, is_shown=is_shown)))
         with request.watching(), RunProgress(simulation, frame_count) as progress:
             for frame in frames:
                 for sink in sinks:
@@ -178,10 +180,6 @@ def _advance(
                 progress.advance(frame)
                 if request.is_made or (ends_early and simulation.is_finished):
                     break
-    finally:
-        frames.close()
-        for sink in sinks:
-            sink.close()
     return time.perf_counter() - begin, request.is_made
 
 

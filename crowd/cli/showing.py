@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Protocol
+from types import TracebackType
+from typing import TYPE_CHECKING, Annotated, Protocol, Self
 
 import typer
 
@@ -18,13 +19,17 @@ CameraText = Annotated[str | None, typer.Option(help='{"eye": [x, y, z], "target
 
 
 class FrameSink(Protocol):
-    """Whatever takes the frames of a run one after the other."""
+    """Whatever takes the frames of a run one after the other, in a ``with`` block."""
 
     def record(self, frame: Frame) -> None:
         """Take a frame."""
 
-    def close(self) -> None:
-        """Finish."""
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Finish; after an error, this one is told and none of finishing."""
 
 
 def require_viewer(

@@ -350,12 +350,9 @@ def record_bodies(
     simulation = FollowingSimulation(
         trajectories, seed=seed, motions=motions, character_files=character_files
     )
-    recorder = Recorder(path, simulation)
-    try:
+    with Recorder(path, simulation) as recorder:
         while not simulation.is_finished:
             frame = simulation.step()
             recorder.record(frame)
             on_frame(frame)
-    finally:
-        recorder.close()
     return simulation

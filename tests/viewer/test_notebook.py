@@ -72,3 +72,22 @@ def test_a_film_without_a_frame_leaves_no_file(drawing, walkers, tmp_path):
     with pytest.raises(KeyError), VideoWriter(path):
         raise KeyError
     assert not list(tmp_path.iterdir())
+
+
+def test_what_fails_first_is_told_and_not_that_the_film_is_empty(drawing, walkers, tmp_path, monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+    from crowd_viewer.video import Film
+
+    def fail():
+        raise CrowdError("the step has failed")
+
+    monkeypatch.setattr(walkers, "step", fail)
+    with pytest.raises(CrowdError, match="the step has failed"):
+        drawing.clip(walkers, seconds=0.5, size=(160, 96))
+    with pytest.raises(KeyError), Film(tmp_path / "film.mp4", walkers, size=(160, 96)):
+        raise KeyError
+    with (
+        pytest.raises(CrowdError, match="there is no frame to show"),
+        Film(tmp_path / "film.mp4", walkers, size=(160, 96)),
+    ):
+        pass

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from crowd.cli import exit_code
+from crowd.errors import CrowdError
+from crowd.recording import Recording
 
 
 def test_wrong_files_are_refused_before_the_run(drawing, capsys):
@@ -19,6 +21,24 @@ def test_wrong_files_are_refused_before_the_run(drawing, capsys):
     ):
         assert exit_code(["run", "plaza", *arguments]) == 2
         assert capsys.readouterr().err.startswith(expected)
+
+
+def test_a_video_that_fails_is_told_and_the_recording_is_finished(drawing, tmp_path, capsys, monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+    from crowd_viewer.video import Film
+
+    def fail(film, frame):
+        if frame.index == 9:
+            raise CrowdError("the encoder has stopped")
+
+    monkeypatch.setattr(Film, "record", fail)
+    video, recording = tmp_path / "a.mp4", tmp_path / "a.h5"
+    arguments = ["run", "plaza", "--characters", 5, "--seconds", 0.5, "--threads", 1]
+    arguments += ["--video", video, "--record", recording]
+    assert exit_code([str(argument) for argument in arguments]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == "the encoder has stopped"
+    with Recording(recording) as finished:
+        assert finished.frame_count == 5
 
 
 def test_a_run_leaves_a_picture_a_video_and_a_recording_to_view(drawing, tmp_path, capsys):

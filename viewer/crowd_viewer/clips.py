@@ -92,19 +92,16 @@ def clip(
     with tempfile.TemporaryDirectory(prefix="crowd-") as folder:
         path = Path(folder) / "clip.mp4"
         if isinstance(source, Simulation):
-            film = Film(
+            with Film(
                 path,
                 source,
                 camera=camera,
                 size=size,
                 quality=quality,
                 frames_per_second=frames_per_second,
-            )
-            try:
+            ) as film:
                 for frame in source.run(seconds):
                     film.record(frame)
-            finally:
-                film.close()
         else:
             begin = float(source.time[0]) if start is None and source.frame_count else start
             film_recording(

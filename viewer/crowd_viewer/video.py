@@ -128,7 +128,7 @@ class VideoWriter:
 
 
 class Film:
-    """Films a simulation: hand it every frame, it draws those that are due.
+    """Films a simulation: hand it every frame, it draws those that are due; use it in a ``with`` block.
 
     Parameters
     ----------
@@ -181,6 +181,19 @@ class Film:
         """
         self._renderer.release()
         self._writer.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.close()
+        except (ViewerError, OSError):
+            # What went wrong first is told.
+            if error is None:
+                raise
 
 
 def film_recording(
