@@ -43,10 +43,11 @@ def _heights_at(simulation: Simulation, item: int, x: float, z: float) -> list[f
     for shape in model.world.obstacles:
         if not isinstance(shape, Wall) and shape.geometry().covers(point):
             heights.append(shape.height)
-    away = objects.position_world[:, [0, 2]] - (x, z)
-    half = model.objects.half_size.max(axis=1)
-    for other in np.flatnonzero((objects.holder < 0) & (np.abs(away) <= half[:, None]).all(axis=1)):
-        if other != item:
-            rise = -model.objects.lowest_point(int(other), objects.rotation_world[other])
-            heights.append(float(objects.position_world[other, 1]) + rise)
+    away = (x, z) - objects.position_world[:, [0, 2]]
+    farthest = np.linalg.norm(model.objects.half_size, axis=1)
+    for other in np.flatnonzero((objects.holder < 0) & (np.abs(away) <= farthest[:, None]).all(axis=1)):
+        least, greatest = model.objects.bounds(int(other), objects.rotation_world[other])
+        is_below = (least[[0, 2]] <= away[other]) & (away[other] <= greatest[[0, 2]])
+        if other != item and is_below.all():
+            heights.append(float(objects.position_world[other, 1] + greatest[1]))
     return heights

@@ -95,17 +95,23 @@ class Objects:
 
     def lowest_point(self, index: int, rotation_world: FloatArray) -> float:
         """Height of the lowest point of an object against its centre when it is turned (4,), m, <= 0."""
+        return float(self.bounds(index, rotation_world)[0][1])
+
+    def bounds(self, index: int, rotation_world: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Least and greatest coordinates of an object turned (4,) about its centre, m. Two (3,) arrays."""
         half = self.half_size[index]
         columns = rotate(rotation_world, np.eye(3))
         match ShapeKind(int(self.kind[index])):
             case ShapeKind.SPHERE:
-                return -float(half[0])
+                reach = np.full(3, half[0])
             case ShapeKind.BOX:
-                return -float(np.abs(columns[:, 1]) @ half)
+                reach = half @ np.abs(columns)
             case ShapeKind.CAPSULE:
-                return -float(half[0] + abs(columns[1, 1]) * (half[1] - half[0]))
+                reach = half[0] + np.abs(columns[1]) * (half[1] - half[0])
             case ShapeKind.MESH:
-                return float((self.meshes[self.mesh[index]].vertex @ columns[:, 1]).min())
+                vertex = self.meshes[self.mesh[index]].vertex @ columns
+                return vertex.min(axis=0), vertex.max(axis=0)
+        return -reach, reach
 
 
 class ObjectState:

@@ -114,6 +114,37 @@ def test_things_stand_on_the_ground_boards_boxes_and_other_things(tmp_path, plac
     assert is_carried(simulation, 0, np.array(place)) is expected
 
 
+VASE = """
+[[objects]]
+name = "vase"
+shape = "box"
+size = [0.06, 0.4, 0.06]
+position = [0.0, 0.75, 3.3]
+rotation = ROTATION
+resting = true
+"""
+UPRIGHT, LYING_ALONG_X = "[0.0, 0.0, 0.0]", "[0.0, 0.0, 90.0]"
+
+
+@pytest.mark.parametrize(
+    ("rotation", "place", "expected"),
+    [
+        (UPRIGHT, (0.02, 1.15, 3.3), True),
+        (UPRIGHT, (0.15, 1.15, 3.3), False),
+        (UPRIGHT, (0.0, 1.15, 3.45), False),
+        (UPRIGHT, (0.0, 0.81, 3.3), False),
+        (LYING_ALONG_X, (0.15, 0.81, 3.3), True),
+        (LYING_ALONG_X, (0.25, 0.81, 3.3), False),
+        (LYING_ALONG_X, (0.0, 0.81, 3.45), False),
+        (LYING_ALONG_X, (0.0, 1.15, 3.3), False),
+    ],
+)
+def test_things_carry_what_is_above_them_and_nothing_beside(tmp_path, rotation, place, expected):
+    things = THINGS + VASE.replace("ROTATION", rotation)
+    simulation = scene(tmp_path, person("{ wait = 0.1 }"), TABLE, things=things)
+    assert is_carried(simulation, 0, np.array(place)) is expected
+
+
 def test_a_thing_that_somebody_holds_carries_nothing(tmp_path):
     simulation = scene(tmp_path, person("{ wait = 0.1 }"))
     simulation.objects.holder[1] = 0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from crowd.errors import RecordingError, ScenarioError, SettingsError
+from crowd.motion.rotation import rotate
 from crowd.recording import Recorder, Recording
 from crowd.scenario import load_scenario
 from crowd.scenario.objects import place_objects
@@ -233,3 +234,28 @@ def test_a_checkpoint_holds_the_objects(tmp_path: Path) -> None:
     other.restore(tmp_path / "stop.npz")
     assert other.objects.position_world[0].tolist() == [1, 2, 3]
     assert other.objects.holder[1] == 0
+
+
+@pytest.mark.parametrize("name", ["ball", "carton", "bottle[0]", "stone"])
+def test_bounds_enclose_the_turned_surface_and_touch_it(tmp_path: Path, name: str) -> None:
+    (tmp_path / "stone.obj").write_text(TETRAHEDRON, encoding="utf-8")
+    (tmp_path / "room.toml").write_text(SCENE + MESH_TABLE, encoding="utf-8")
+    objects = Simulation(load_scenario(tmp_path / "room.toml"), threads=1).model.objects
+    row = objects.index(name)
+    half = objects.half_size[row]
+    up, around = np.meshgrid(np.linspace(-np.pi / 2.0, np.pi / 2.0, 101), np.linspace(0.0, 2.0 * np.pi, 200))
+    sphere = np.stack([np.cos(up) * np.cos(around), np.sin(up), np.cos(up) * np.sin(around)], axis=-1)
+    sphere = sphere.reshape(-1, 3)
+    surface = {
+        "ball": half[0] * sphere,
+        "carton": half * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T,
+        "bottle[0]": half[0] * sphere + np.sign(sphere) * (0.0, half[1] - half[0], 0.0),
+        "stone": objects.meshes[objects.mesh[row]].vertex,
+    }[name]
+    for rotation in np.random.default_rng(4).normal(size=(20, 4)):
+        rotation /= np.linalg.norm(rotation)
+        turned = rotate(rotation, surface)
+        least, greatest = objects.bounds(row, rotation)
+        np.testing.assert_allclose(least, turned.min(axis=0), atol=1e-4)
+        np.testing.assert_allclose(greatest, turned.max(axis=0), atol=1e-4)
+        assert objects.lowest_point(row, rotation) == least[1]
