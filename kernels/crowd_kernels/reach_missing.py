@@ -27,7 +27,7 @@ CHUNKS = 32
 NOTHING = 0
 BOTH = 3
 """Tasks of a hand: nothing, and position with rotation."""
-SLIGHT, SLIGHT_TURN = 0.6, 2.4
+SLIGHT, SLIGHT_TURN = 0.6, 3.2
 """Much less than a step at these speeds is made up for at once, the rest at the given rate, m/s and rad/s."""
 EXACT = np.float32(1e-4)
 """Nothing is missing where inverse kinematics comes this close, m."""
