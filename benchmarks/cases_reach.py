@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from benchmarks.case import Case
-from crowd.bench.reach import Reachers, random_targets
+from crowd.bench.reachers import Reachers, random_targets
 from crowd.blending.reach_space import ReachSpace
 from crowd.controllers.controller import Step
 from crowd.controllers.reach import built_in_reach_space

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from benchmarks.case import Case
-from crowd.bench.reach import Reachers
+from crowd.bench.reachers import Reachers
 from crowd.blending.reach_space import SIDES
 from crowd.controllers.reach import REACH_LIMITS
 from crowd.motion.rotation import about, multiply, rotate
@@ -17,7 +17,8 @@ from crowd_kernels.aligned import aligned_copy, aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.reach import CHUNKS, reach_crowd
-from crowd_kernels.reach_blend import CHAIN, JOINTS, SAME_PLACE, SCRATCH_ROW
+from crowd_kernels.reach_blend import CHAIN, JOINTS, SCRATCH_ROW
+from crowd_kernels.reach_examples import SAME_PLACE
 from crowd_kernels.reach_goal import ReachState
 from crowd_kernels.reach_space import NEAREST
 

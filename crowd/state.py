@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from crowd_kernels.aligned import aligned_full
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.reach_blend import SLOTS
 from crowd_kernels.reach_correction import LANES as CORRECTED_JOINTS
+from crowd_kernels.reach_examples import SLOTS
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -215,17 +215,26 @@ class State:
     reach_seen_velocity: FloatArray = _array(2, 3)
     """Its velocity, m/s. (character, 2, 3)"""
     reach_offset: FloatArray = _array(2, 3)
-    """Goal of the hand against `reach_seen`: what is left of the way to a new target, m. (character, 2, 3)"""
+    """Goal of the hand against where the blended examples have it at their apex, m. (character, 2, 3)"""
     reach_offset_velocity: FloatArray = _array(2, 3)
     """m/s. (character, 2, 3)"""
-    reach_offset_acceleration: FloatArray = _array(2, 3)
+    reach_nearest: FloatArray = _array(2, 3)
+    """Offset that would bring the hand to its target in the last step, m. (character, 2, 3)"""
+    reach_lag: FloatArray = _array(2, 3)
+    """What is left of the glide of `reach_offset` to a new target, m. (character, 2, 3)"""
+    reach_lag_velocity: FloatArray = _array(2, 3)
+    """m/s. (character, 2, 3)"""
+    reach_lag_acceleration: FloatArray = _array(2, 3)
     """m/s^2. (character, 2, 3)"""
     reach_time_left: FloatArray = _array(2)
-    """Time until the goal is at the target, s. (character, 2)"""
+    """Time until the hand has glided to a target that has jumped, s. (character, 2)"""
     reach_plan_time: FloatArray = _array(2, fill=1)
-    """Length of the present way to a new target, s. (character, 2)"""
+    """Length of that glide, s. (character, 2)"""
     reach_bulge: FloatArray = _array(2, 3)
-    """Farthest departure of that way from a straight line, m. (character, 2, 3)"""
+    """How far the middle of its way is moved from the body, m. (character, 2, 3)"""
+    reach_glide_turn: FloatArray = _array(2, 4)
+    """How the blend turns the hand now against where the glide ends, in the frame of the latter.
+    (character, 2, 4)"""
     reach_rotation: FloatArray = _array(2, 4)
     """Rotation of the goal in the root frame. (character, 2, 4)"""
     reach_turn_velocity: FloatArray = _array(2, 3)
@@ -239,6 +248,8 @@ class State:
     (character, 2, 3)"""
     reach_rotation_share: FloatArray = _array(2)
     """How far the rotation of the goal counts, 0 to 1. (character, 2)"""
+    reach_rotation_rate: FloatArray = _array(2)
+    """Rate of change of `reach_rotation_share`, 1/s. (character, 2)"""
     reach_missing_place: FloatArray = _array(2, 3)
     """Way from the point of the hand to where it was wanted in the last step, root frame, m.
     (character, 2, 3)"""
@@ -246,13 +257,15 @@ class State:
     """Rotation vector from the hand to the rotation wanted in the last step, root frame, rad.
     (character, 2, 3)"""
     reach_example: IntArray = _array(2, SLOTS, dtype=np.int32)
-    """Examples that are blended; those of weight 0 mean nothing. (character, 2, 24)"""
+    """Examples that are blended; those of weight 0 mean nothing. (character, 2, 72)"""
     reach_example_weight: FloatArray = _array(2, SLOTS)
-    """Their weights, which follow those of the goal. (character, 2, 24)"""
+    """Their weights, which follow those of the goal. (character, 2, 72)"""
     reach_example_weight_rate: FloatArray = _array(2, SLOTS)
-    """1/s. (character, 2, 24)"""
+    """1/s. (character, 2, 72)"""
+    reach_example_weight_acceleration: FloatArray = _array(2, SLOTS)
+    """1/s^2. (character, 2, 72)"""
     reach_example_wanted: FloatArray = _array(2, SLOTS)
-    """Weights that they come to. (character, 2, 24)"""
+    """Weights that they come to. (character, 2, 72)"""
     reach_example_count: IntArray = _array(2, dtype=np.int32)
     """Place after the last example that is blended. (character, 2)"""
     reach_looked_up: FloatArray = _array(2, 3)

@@ -315,8 +315,9 @@ class Carrying:
             # the object turn to rest first.
             state.reach_seen[rows, hand] = frames[0]
             state.reach_seen_velocity[rows, hand] = 0.0
-            for name in ("offset", "offset_velocity", "offset_acceleration", "bulge", "time_left"):
+            for name in ("lag", "lag_velocity", "lag_acceleration", "bulge", "time_left"):
                 getattr(state, f"reach_{name}")[rows, hand] = 0.0
+            state.reach_glide_turn[rows, hand] = (1.0, 0.0, 0.0, 0.0)
             tight = rows[moves]
             state.reach_rotation[tight, hand] = multiply(conjugate(heading[moves]), wanted[moves])
             state.reach_turn_velocity[tight, hand] = 0.0

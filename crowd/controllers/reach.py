@@ -46,17 +46,19 @@ REACH_LIMITS = ReachLimits(
     least_time=0.25,
     time_per_metre=0.57,
     time_per_radian=0.7,
+    time_shared=3.0,
     acceleration=12.0,
     target_speed=2.5,
-    bulge=0.12,
+    turn_acceleration=15.0,
+    far_turn_time=0.32,
     clearance=0.30,
     body_radius=0.10,
-    turn_back=5.0,
+    turn_back=3.0,
     lead=0.8,
     rotation_rate=3.0,
     farthest=0.13,
     missing_rate=8.0,
-    example_rate=22.0,
+    example_time=0.25,
 )
 SOLVE = SETTINGS._replace(
     reach=1e3,
@@ -68,6 +70,8 @@ SOLVE = SETTINGS._replace(
     passes=8,  # Arms at many limits at once, far from rotations they cannot have, sway with fewer.
 )
 EFFECTORS = ("right_hand", "left_hand")
+BOTH_HANDS = 3
+"""Mask of effectors: bit 0 the right hand, bit 1 the left one."""
 read_parts = attrgetter(*(f"reach_{name}" for name in ReachState._fields))
 """Reads the fields of a state that the kernels of reaches change."""
 FEWEST_EXAMPLES = 8
@@ -84,6 +88,9 @@ class ReachSettings:
     """How inverse kinematics brings hands to their targets, for iterations of `iteration_time`."""
     iteration_time: float = 1.0 / 120.0
     """Longest time that one iteration serves, s. The same number in every step keeps motions smooth."""
+    shared_error_damping: float = 0.8
+    """Damping by errors where both hands pull at one trunk, see `SolveSettings.error_damping`. Larger: hands
+    that cannot both be where they should stay farther away, but joints leave and meet limits more softly."""
     fade_rate: float = 6.0
     """Rate with which turns of joints fade that the targets do not ask for, 1/s. Where it is larger, hands
     stop short of rotations far from the blended ones, since damped steps make up for less than fades."""
@@ -98,15 +105,15 @@ class ReachSettings:
 
 
 @cache
-def solve_settings(settings: ReachSettings, dt: float) -> SolveSettings:
-    """Settings of the solves in steps of `dt` s, for like motions with any step."""
+def solve_settings(settings: ReachSettings, dt: float, is_shared: bool) -> SolveSettings:
+    """Settings of the solves of one hand, or of both, in steps of `dt` s, for like motions with any step."""
     iterations = math.ceil(dt / settings.iteration_time - 1e-9)
     span = dt / iterations
     stiffness = settings.iteration_time / span
     solve = settings.solve
     return solve._replace(
         damping=solve.damping * math.sqrt(stiffness),
-        error_damping=solve.error_damping * stiffness,
+        error_damping=(settings.shared_error_damping if is_shared else solve.error_damping) * stiffness,
         turn_error_damping=solve.turn_error_damping * stiffness,
         pull=1.0 - math.exp(-settings.fade_rate * span),
         approach=1.0 - math.exp(-settings.limit_rate * span),
@@ -142,7 +149,7 @@ class Reach:
         self._size = np.ascontiguousarray(stature / library.skeleton.stature)
         self._space: ReachSpace | None = None
         self._trees = joint_trees(library.skeleton, EFFECTORS)
-        self._tree = self._trees[(1 << len(EFFECTORS)) - 1]
+        self._tree = self._trees[BOTH_HANDS]
         require_lanes(len(self._tree.joint))
         capacity = len(stature)
         self._rows = aligned_zeros((CHUNKS, SCRATCH_ROW), np.float32)
@@ -246,12 +253,24 @@ class Reach:
         for name in (
             "offset",
             "offset_velocity",
-            "offset_acceleration",
+            "nearest",
+            "lag",
+            "lag_velocity",
+            "lag_acceleration",
             "turn_velocity",
             "turn_acceleration",
         ):
             getattr(state, f"reach_{name}")[rows, own] = 0.0
-        for name in ("course", "course_rate", "time_left", "seen_velocity", "bulge", "turn", "turn_before"):
+        for name in (
+            "course",
+            "course_rate",
+            "time_left",
+            "seen_velocity",
+            "bulge",
+            "turn",
+            "turn_before",
+            "rotation_rate",
+        ):
             getattr(state, f"reach_{name}")[rows, own] = 0.0
         state.reach_rotation_share[rows, own] = state.reach_has_rotation[rows, own]
         away = state.reach_target_world[rows, own] - state.position_world[rows]
@@ -260,6 +279,7 @@ class Reach:
         state.reach_seen[rows, own, 1] = away[:, 1]
         state.reach_seen[rows, own, 2] = sine * away[:, 0] + cosine * away[:, 2]
         state.reach_rotation[rows, own] = (1.0, 0.0, 0.0, 0.0)
+        state.reach_glide_turn[rows, own] = (1.0, 0.0, 0.0, 0.0)
         if rotation_world is not None:
             turned = state.reach_target_rotation_world[rows, own]
             w, x, y, z = turned.T
@@ -370,7 +390,6 @@ class Reach:
             state.reach_last_rotation,
             self._solution,
         )
-        settings = solve_settings(self.settings, dt)
         asks = (self._task != 0)[reaching]
         hands = asks[:, 0] + 2 * asks[:, 1]
         for mask, tree in self._trees.items():
@@ -379,7 +398,7 @@ class Reach:
                 continue
             solve_crowd(
                 tree,
-                settings,
+                solve_settings(self.settings, dt, mask == BOTH_HANDS),
                 self._segment_scale,
                 self._task,
                 self._point,

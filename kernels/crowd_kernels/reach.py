@@ -3,8 +3,6 @@
 import math
 from typing import Any
 
-import numpy as np
-
 from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.easing import minimum_jerk
@@ -20,19 +18,25 @@ from crowd_kernels.quaternion import (
 )
 from crowd_kernels.reach_blend import (
     CHAIN,
-    JOINTS,
     ROW,
     ReachKeys,
     blend_body,
     bone_of,
-    choose_examples,
     local_rotation,
     pelvis_of,
     place_hand,
-    sum_examples,
-    unit_row,
 )
 from crowd_kernels.reach_correction import LANES as CORRECTED
+from crowd_kernels.reach_examples import find_examples, follow_weights
+from crowd_kernels.reach_glide import (
+    glide,
+    is_elsewhere,
+    place_apex,
+    plan_glide,
+    shortened,
+    still_to_come,
+    take_over,
+)
 from crowd_kernels.reach_goal import (
     APEX,
     END,
@@ -40,9 +44,11 @@ from crowd_kernels.reach_goal import (
     RETURN,
     ReachLimits,
     ReachState,
+    advance_course,
     course_shares,
-    goal_of,
+    follow_rotation,
     quaternion_of,
+    set_quaternion,
     set_vector,
     track_target,
     vector_of,
@@ -52,19 +58,8 @@ from crowd_kernels.reach_space import ReachArrays
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 CHUNKS = 32
-ZERO = np.float32(0.0)
-SPARED = 0.15
-"""Share of its longest way that a hand leaves out for targets twice as far and more."""
-SHARED_TRUNK = 0.3
+SHARED_TRUNK = 0.25
 """How much farther hands may be from their goals where both share the trunk, m."""
-
-
-@inlined_kernel
-def shortened(vector: Vector, longest: float) -> Vector:
-    """Shorten a way to the longest that inverse kinematics goes, less for what is hopelessly far."""
-    length = max(norm(vector), 1e-9)
-    hopeless = minimum_jerk(min(max(length / longest - 1.0, 0.0), 1.0))
-    return scaled(vector, min(longest * (1.0 - SPARED * hopeless) / length, 1.0))
 
 
 @inlined_kernel
@@ -144,6 +139,7 @@ def aim_hand(
     arm: int,
     other: float,
     begins: bool,
+    has_passed: bool,
     scale: Any,
     live_pelvis: Vector,
     live_rotation: Quaternion,
@@ -171,6 +167,8 @@ def aim_hand(
         Share of the other hand's examples.
     begins : bool
         A rotation is asked for from now on.
+    has_passed : bool
+        The course has come to the apex in this step, or left it.
     scale : (G,) float32
         Proportions.
     live_pelvis, live_rotation : tuple of float
@@ -188,25 +186,25 @@ def aim_hand(
 
     Notes
     -----
-    All other arguments are those of `choose_examples` and `reach_crowd`.
+    All other arguments are those of `reach_character`.
 
     **Source:** Feng, Xu, Shapiro, section 5.2, the target that varies in time.
     **Differs from the source:** the share rises along a minimum-jerk curve instead of evenly, so that the
     hand neither starts nor stops abruptly.
     """
-    leg = float(scale[keys.leg_segment])
     course = state.course[character, arm]
     side = course if course <= APEX else END - course
     _, risen = course_shares(course, limits.lead)
     asked = minimum_jerk(state.rotation_share[character, arm])
     has_rotation = state.has_rotation[character, arm] or asked > 0.0
-    kept = kept_share(course, state.course_rate[character, arm] * dt, limits.lead)
+    advance = state.course_rate[character, arm] * dt
+    kept = kept_share(course, advance, limits.lead)
     out_kept[character, arm] = kept
     kept *= math.exp(-limits.missing_rate * dt)
     body, rotation = pelvis_of(keys, scale, pose, pelvis)
     hand, turned = place_hand(keys, arm, scale, body, rotation, pose, PADDED_JOINTS)
     point = vector_of(state.point_hand, character, arm)
-    goal = goal_of(state, character, arm)
+    goal = vector_of(state.seen, character, arm)
     here = add(hand, rotate(turned, point))
     left = share_of_other(character, arm, risen, limits, state)
     if left > 0.0:
@@ -222,31 +220,32 @@ def aim_hand(
         turn_before = scaled(vector_of(state.turn_before, character, arm), 1.0 - asked)
         turned = multiply(from_rotation_vector(turn_before), turned)
     wanted = quaternion_of(state.rotation, character, arm)
+    apex, apex_turned = here, turned
+    is_gliding = state.time_left[character, arm] > 0.0
+    if course != APEX or is_gliding:
+        apex, apex_turned = place_apex(
+            character, arm, state.example_weight, scale, live_pelvis, live_rotation, keys, state, row
+        )
+    if is_gliding:
+        end, end_turned = place_apex(
+            character, arm, state.example_wanted, scale, live_pelvis, live_rotation, keys, state, row
+        )
+        shift, aside = still_to_come(character, arm, apex, end, apex_turned, end_turned, state)
+        goal = subtract(goal, shift)
+        wanted = multiply(wanted, aside)
+        set_quaternion(state.glide_turn, character, arm, aside)
     # Beyond the blends inverse kinematics would find nothing that looks human.
     farthest = limits.farthest + SHARED_TRUNK * other
-    nearest = add(here, shortened(subtract(goal, here), farthest))
-    target = nearest
+    nearest = shortened(subtract(goal, here), farthest)
+    offset = nearest
     late = 1.0
     out_task[character, arm] = 1
     if course != APEX:
-        row[:] = ZERO
-        moved, whole = sum_examples(character, arm, 0, APEX, keys, state, row)
-        _, upper = sum_examples(character, arm, 1, APEX, keys, state, row)
-        upper_share = upper / (whole + upper)
-        moved = scaled(moved, 1.0 / (whole + upper))
-        unit_row(row)
-        apex_body = add(scaled(moved, leg), scaled(live_pelvis, upper_share))
-        apex_rotation = slerp(
-            (float(row[0]), float(row[JOINTS]), float(row[2 * JOINTS]), float(row[3 * JOINTS])),
-            live_rotation,
-            upper_share,
-        )
-        apex, apex_turned = place_hand(keys, arm, scale, apex_body, apex_rotation, row, JOINTS)
-        miss = shortened(subtract(goal, add(apex, rotate(apex_turned, point))), farthest)
-        target = add(here, scaled(miss, risen))
         # A trunk that is shared with the other hand does not do what was foreseen.
         late = minimum_jerk(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * minimum_jerk(min(5.0 * other, 1.0))
-        target = add(target, scaled(subtract(nearest, target), late))
+        offset = shortened(subtract(goal, apex), farthest)
+        if late > 0.0:
+            offset = add(offset, scaled(subtract(scaled(nearest, 1.0 / risen), offset), late))
         turn = rotation_vector(multiply(wanted, conjugate(apex_turned)))
         state.turn[character, arm] = norm(turn) if has_rotation else 0.0
         turned = multiply(from_rotation_vector(scaled(turn, risen * asked)), turned)
@@ -254,6 +253,12 @@ def aim_hand(
         state.turn[character, arm] = 0.0
     elif state.rotation_share[character, arm] < 1.0:
         state.turn[character, arm] = norm(rotation_vector(multiply(wanted, conjugate(turned))))
+    if has_passed and not is_gliding and other > 0.0 and is_elsewhere(character, arm, state):
+        offset = take_over(character, arm, nearest, limits, dt, state)
+    else:
+        offset = glide(character, arm, offset, farthest, course <= advance, dt, state)
+    set_vector(state.nearest, character, arm, nearest)
+    target = add(here, scaled(offset, risen))
     if asked > 0.0:
         out_task[character, arm] = 3
         turned = slerp(turned, wanted, late * asked)
@@ -330,28 +335,65 @@ def reach_character(
     live_pelvis, live_rotation = pelvis_of(keys, scale, pose, pelvis)
     own = (0.0, 0.0)
     begin = (False, False)
+    passed = (False, False)
     for arm in range(2):
         if state.stage[character, arm] == NONE:
             continue
-        if state.stage[character, arm] != RETURN:
-            is_free = state.rotation_share[character, arm] <= 0.0
-            track_target(character, arm, position_world, yaw, live_pelvis, size, limits, dt, state)
-            is_asked = is_free and state.rotation_share[character, arm] > 0.0
-            begin = (is_asked, begin[1]) if arm == 0 else (begin[0], is_asked)
-        choose_examples(
+        course = state.course[character, arm]
+        before = vector_of(state.seen, character, arm)
+        shared = SHARED_TRUNK * state.weight[character, 1 - arm]
+        is_free = state.rotation_share[character, arm] <= 0.0
+        has_jumped, turned = track_target(
+            character, arm, position_world, yaw, live_pelvis, size, limits, dt, state
+        )
+        is_asked = is_free and state.rotation_share[character, arm] > 0.0
+        begin = (is_asked, begin[1]) if arm == 0 else (begin[0], is_asked)
+        begins, is_new = find_examples(
             character,
             arm,
+            turned,
+            has_jumped,
             live_pelvis,
             size,
             upper_share,
             limits,
             space,
             keys,
-            dt,
             state,
             number,
             real,
         )
+        if begins or is_new:
+            plan_glide(
+                character,
+                arm,
+                turned,
+                before,
+                shared,
+                begins,
+                scale,
+                live_pelvis,
+                live_rotation,
+                keys,
+                limits,
+                state,
+                rows,
+            )
+        follow_rotation(character, arm, turned, limits, dt, state)
+        there, back = follow_weights(character, arm, limits, keys, dt, state)
+        # Long limbs move more slowly (dynamic similarity).
+        time = state.seconds[character, arm]
+        if time <= 0.0:
+            time = max(there * math.sqrt(size), limits.time_per_radian * state.turn[character, arm])
+            if shared > 0.0:
+                time += limits.time_shared * norm(vector_of(state.offset, character, arm))
+        ahead = APEX - course
+        if ahead > 0.0 and state.stage[character, arm] != RETURN:
+            # On its way there a hand is not at the apex before it has glided to its new target.
+            time = max(time, state.time_left[character, arm] / ahead)
+        advance_course(character, arm, 1.0 / time, there / (back * time), limits, dt, state)
+        has_passed = (course == APEX) != (state.course[character, arm] == APEX)
+        passed = (has_passed, passed[1]) if arm == 0 else (passed[0], has_passed)
         if state.stage[character, arm] != NONE:
             share, _ = course_shares(state.course[character, arm], limits.lead)
             state.weight[character, arm] = share
@@ -365,6 +407,7 @@ def reach_character(
                 arm,
                 own[1 - arm],
                 begin[arm],
+                passed[arm],
                 scale,
                 live_pelvis,
                 live_rotation,
@@ -463,8 +506,8 @@ def reach_crowd(
     -----
     **Source:** Feng, Xu, Shapiro, section 5.1 and 5.2.
     **Differs from the source:** the two sections of each example are stretched by themselves, so that apexes
-    coincide; from one target to another the parameter moves along a curved minimum-jerk way instead of a
-    linear interpolation of poses.
+    coincide; from one target to another the weights of the examples, and what they miss, settle with least
+    jerk instead of a linear interpolation of poses.
     """
     count = active.shape[0]
     for k in prange(CHUNKS):

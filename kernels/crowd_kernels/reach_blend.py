@@ -1,10 +1,9 @@
-"""The pose of reaching people: examples of both hands, blended over the pose below.
+"""The pose of reaching people: examples of both hands, blended over the pose below them.
 
 Both sections of all examples are stretched to the course of the reach, so that apexes coincide. Pose rows are
 compact here: the 24 joints of pelvis, legs, trunk, head and arms; fingers are left to grasping.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,34 +11,15 @@ import numpy.typing as npt
 
 from crowd_kernels._jit import inlined_kernel
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.locomotion import ease
-from crowd_kernels.quaternion import Quaternion, multiply, normalized, rotate
-from crowd_kernels.reach_goal import (
-    APEX,
-    ReachLimits,
-    ReachState,
-    advance_course,
-    goal_of,
-    quaternion_of,
-    set_vector,
-    vector_of,
-)
-from crowd_kernels.reach_space import NEAREST, SCRATCH, ReachArrays, weigh_examples
-from crowd_kernels.vector import Vector, add, norm, scaled, subtract
+from crowd_kernels.quaternion import Quaternion, multiply, normalized, rotate, slerp
+from crowd_kernels.reach_goal import APEX, ReachState
+from crowd_kernels.vector import Vector, add, scaled
 
 JOINTS = 24
 ROW = 4 * JOINTS
 """Length of a compact pose row: components outermost, 24 joints each."""
 SCRATCH_ROW = 3 * ROW + JOINTS
 """Length of a chunk's scratch row for `reach_crowd`."""
-SLOTS = 24
-"""Most examples that are blended for one hand."""
-LEAST_WEIGHT = 1e-4
-"""Weights that fade end here."""
-SAME_PLACE = 0.004
-"""A look-up serves places this close to its own, m; a tenth of the spacing of pseudo-examples."""
-SAME_SHARE = 0.01
-"""Likewise for the share of the upper body's examples."""
 CHAIN = 9
 """Joints from pelvis to hand."""
 LOWER, UPPER, RIGHT_ARM, LEFT_ARM = 0, 1, 2, 3
@@ -89,273 +69,6 @@ class ReachKeys(NamedTuple):
 
 
 @inlined_kernel
-def wrist_of_goal(
-    keys: ReachKeys,
-    arm: int,
-    goal: Vector,
-    rotation: Quaternion,
-    has_rotation: bool,
-    point: Vector,
-    size: float,
-) -> Vector:
-    """Estimate where the wrist is when a point of the hand is at its goal, root frame, m."""
-    length = norm(point)
-    if length == 0.0:
-        return goal
-    if has_rotation:
-        return subtract(goal, rotate(rotation, point))
-    shoulder = (size * keys.shoulder[arm, 0], size * keys.shoulder[arm, 1], size * keys.shoulder[arm, 2])
-    way = subtract(goal, shoulder)
-    distance = max(norm(way), 1e-6)
-    return subtract(goal, scaled(way, min(length / distance, 0.5)))
-
-
-@inlined_kernel
-def look_up(
-    part: int,
-    arm: int,
-    wrist: Vector,
-    pelvis: Vector,
-    size: float,
-    space: ReachArrays,
-    keys: ReachKeys,
-    number: Any,
-    real: Any,
-) -> int:
-    """Find the examples of a set for a wrist; those of seated people relative to the pelvis as it is.
-
-    Parameters
-    ----------
-    part : int
-        0 the whole body, 1 the upper body.
-    arm : int
-    wrist, pelvis : tuple of float
-        Root frame, m.
-    size : float
-        Stature over the library's.
-    space : ReachArrays
-    keys : ReachKeys
-    number : (20,) int32
-        Scratch; the examples are written from `NEAREST` on, some of them more than once.
-    real : (100 + E,) float64
-        Scratch; the weights of the examples are added from `SCRATCH` on.
-
-    Returns
-    -------
-    int
-        How many examples are written.
-    """
-    place = scaled(wrist, 1.0 / size)
-    if part == 1:
-        rest = (keys.pelvis_rest[2 + arm, 0], keys.pelvis_rest[2 + arm, 1], keys.pelvis_rest[2 + arm, 2])
-        place = add(scaled(subtract(wrist, pelvis), 1.0 / size), rest)
-    return weigh_examples(space, 2 * part + arm, place[0], place[1], place[2], number, real, real[SCRATCH:])
-
-
-@inlined_kernel
-def is_looked_up(
-    character: int, arm: int, wrist: Vector, pelvis: Vector, upper_share: float, state: ReachState
-) -> bool:
-    """Tell whether the last look-up serves, as nothing that it depends on has moved away from it.
-
-    Parameters
-    ----------
-    character, arm : int
-    wrist, pelvis : tuple of float
-        Root frame, m.
-    upper_share : float
-        0: the whole body reaches; 1: only the upper body.
-    state : ReachState
-    """
-    share = state.looked_up_share[character, arm]
-    if (upper_share <= 0.0) != (share <= 0.0) or (upper_share >= 1.0) != (share >= 1.0):
-        return False
-    if abs(upper_share - share) > SAME_SHARE:
-        return False
-    moved = subtract(wrist, vector_of(state.looked_up, character, arm))
-    if norm(moved) > SAME_PLACE:
-        return False
-    if upper_share <= 0.0:
-        return True
-    return (
-        norm(subtract(moved, subtract(pelvis, vector_of(state.looked_up_pelvis, character, arm))))
-        <= SAME_PLACE
-    )
-
-
-@inlined_kernel
-def add_wanted(share: float, example: Any, weight: Any, character: int, arm: int, state: ReachState) -> None:
-    """Add the weights that examples shall have to their slots, or to free ones; where none is, they are lost.
-
-    Parameters
-    ----------
-    share : float
-        Factor of the weights.
-    example : (S,) int32
-        Examples, some of them more than once.
-    weight : (E,) float64
-        In and out: weights of all examples; then 0 for these.
-    character, arm : int
-    state : ReachState
-        In and out: `example`, `example_wanted`, `example_count`.
-    """
-    count = state.example_count[character, arm]
-    for slot in range(count):
-        clip = state.example[character, arm, slot]
-        if is_slot_used(character, arm, slot, state):
-            state.example_wanted[character, arm, slot] += share * weight[clip]
-            weight[clip] = 0.0
-    free = 0
-    for sample in range(example.shape[0]):
-        clip = example[sample]
-        wanted = share * weight[clip]
-        weight[clip] = 0.0
-        if not wanted > 0.0:
-            continue
-        while free < count and is_slot_used(character, arm, free, state):
-            free += 1
-        if free == SLOTS:
-            continue
-        state.example[character, arm, free] = clip
-        state.example_weight[character, arm, free] = 0.0
-        state.example_weight_rate[character, arm, free] = 0.0
-        state.example_wanted[character, arm, free] = wanted
-        count = max(count, free + 1)
-    state.example_count[character, arm] = count
-
-
-@inlined_kernel
-def is_slot_used(character: int, arm: int, slot: int, state: ReachState) -> bool:
-    """Tell whether a slot holds an example: one that has a weight or shall have one."""
-    has_weight = state.example_weight[character, arm, slot] != 0.0
-    return bool(has_weight or state.example_wanted[character, arm, slot] != 0.0)
-
-
-@inlined_kernel
-def look_up_examples(
-    character: int,
-    arm: int,
-    wrist: Vector,
-    pelvis: Vector,
-    size: float,
-    upper_share: float,
-    space: ReachArrays,
-    keys: ReachKeys,
-    state: ReachState,
-    number: Any,
-    real: Any,
-) -> None:
-    """Set the weights that one hand's examples come to, of both sets that are needed.
-
-    Parameters
-    ----------
-    character, arm : int
-    upper_share : float
-        0: the whole body reaches; 1: only the upper body.
-    state : ReachState
-        In and out: `example` and what belongs to it, `looked_up` likewise.
-
-    Notes
-    -----
-    All other arguments are those of `look_up`.
-    """
-    for slot in range(state.example_count[character, arm]):
-        state.example_wanted[character, arm, slot] = 0.0
-    for part in range(2):
-        share = upper_share if part == 1 else 1.0 - upper_share
-        if share <= 0.0:
-            continue
-        found = look_up(part, arm, wrist, pelvis, size, space, keys, number, real)
-        add_wanted(share, number[NEAREST : NEAREST + found], real[SCRATCH:], character, arm, state)
-    set_vector(state.looked_up, character, arm, wrist)
-    set_vector(state.looked_up_pelvis, character, arm, pelvis)
-    state.looked_up_share[character, arm] = upper_share
-
-
-@inlined_kernel
-def choose_examples(
-    character: int,
-    arm: int,
-    pelvis: Vector,
-    size: float,
-    upper_share: float,
-    limits: ReachLimits,
-    space: ReachArrays,
-    keys: ReachKeys,
-    dt: float,
-    state: ReachState,
-    number: Any,
-    real: Any,
-) -> None:
-    """Let the weights of one hand's examples follow its goal, and advance its course at their pace.
-
-    The weights of a look-up have kinks as the goal moves; those of the blend follow them smoothly. At the
-    start of a reach they are taken over at once.
-
-    Parameters
-    ----------
-    upper_share : float
-        0: the whole body reaches; 1: only the upper body.
-
-    Notes
-    -----
-    All other arguments are those of `look_up` and `reach_character`.
-    """
-    goal = goal_of(state, character, arm)
-    wrist = wrist_of_goal(
-        keys,
-        arm,
-        goal,
-        quaternion_of(state.rotation, character, arm),
-        state.rotation_share[character, arm] > 0.0,
-        vector_of(state.point_hand, character, arm),
-        size,
-    )
-    is_first = state.course[character, arm] <= 0.0
-    if is_first:
-        state.example_count[character, arm] = 0
-    if is_first or not is_looked_up(character, arm, wrist, pelvis, upper_share, state):
-        look_up_examples(character, arm, wrist, pelvis, size, upper_share, space, keys, state, number, real)
-    total = 0.0
-    there = 0.0
-    back = 0.0
-    count = 0
-    for slot in range(state.example_count[character, arm]):
-        wanted = state.example_wanted[character, arm, slot]
-        weight = wanted
-        if weight == 0.0 and state.example_weight[character, arm, slot] == 0.0:
-            continue
-        if not is_first:
-            weight, rate = ease(
-                state.example_weight[character, arm, slot],
-                state.example_weight_rate[character, arm, slot],
-                wanted,
-                limits.example_rate,
-                dt,
-            )
-            state.example_weight_rate[character, arm, slot] = rate
-            if wanted == 0.0 and weight < LEAST_WEIGHT:
-                weight = 0.0
-        weight = max(weight, 0.0)
-        state.example_weight[character, arm, slot] = weight
-        if weight > 0.0 or wanted > 0.0:
-            count = slot + 1
-        if weight > 0.0:
-            clip = state.example[character, arm, slot]
-            total += weight
-            there += weight * keys.apex_time[clip]
-            back += weight * (keys.end_time[clip] - keys.apex_time[clip])
-    state.example_count[character, arm] = count
-    # Long limbs move more slowly (dynamic similarity).
-    slowness = math.sqrt(size) / total
-    time = state.seconds[character, arm]
-    if time <= 0.0:
-        time = max(there * slowness, limits.time_per_radian * state.turn[character, arm])
-    rate = 1.0 / time
-    advance_course(character, arm, rate, rate * there / back, limits, dt, state)
-
-
-@inlined_kernel
 def blend_row(key: Any, next_key: Any, weight: Any, next_weight: Any, out_sum: Any) -> None:
     """Add the weighted sum of two compact rows to a row.
 
@@ -395,7 +108,14 @@ def unit_row(row: Any) -> None:
 
 @inlined_kernel
 def sum_examples(
-    character: int, arm: int, part: int, course: float, keys: ReachKeys, state: ReachState, row: Any
+    character: int,
+    arm: int,
+    part: int,
+    course: float,
+    weights: Any,
+    keys: ReachKeys,
+    state: ReachState,
+    row: Any,
 ) -> tuple[Vector, float]:
     """Add the weighted examples of one hand at a course to a compact row.
 
@@ -405,6 +125,8 @@ def sum_examples(
     part : int
         0 those of the whole body, 1 those of the upper body.
     course : float
+    weights : (N, 2, SLOTS) float64
+        `state.example_weight` or `state.example_wanted`.
     keys : ReachKeys
     state : ReachState
     row : (96,) float32
@@ -420,9 +142,9 @@ def sum_examples(
     z = 0.0
     total = 0.0
     for slot in range(state.example_count[character, arm]):
-        own = state.example_weight[character, arm, slot]
+        own = weights[character, arm, slot]
         clip = state.example[character, arm, slot]
-        if own <= 0.0 or (clip >= keys.first_seated) != (part == 1):
+        if own == 0.0 or (clip >= keys.first_seated) != (part == 1):
             continue
         apex = keys.apex[clip]
         place = course * apex
@@ -607,10 +329,12 @@ def blend_body(
         other = own[arm] * (1.0 - own[1 - arm]) * (1.0 - walking_share)
         for part in range(2):
             weight, whole = weight_of_part(character, arm, part, keys, state)
-            if weight <= 0.0:
+            if weight == 0.0:
                 continue
             row[:] = ZERO
-            moved, _ = sum_examples(character, arm, part, state.course[character, arm], keys, state, row)
+            moved, _ = sum_examples(
+                character, arm, part, state.course[character, arm], state.example_weight, keys, state, row
+            )
             unit_row(row)
             share = weight / whole
             right = share * (own[arm] if arm == 0 else other)
@@ -625,10 +349,11 @@ def blend_body(
                 shares,
             )
             add_group_row(row, live, shares, total)
-            x += lower * moved[0] / weight
-            y += lower * moved[1] / weight
-            z += lower * moved[2] / weight
-            below += lower
+            if part == 0:
+                x += trunk / whole * moved[0]
+                y += trunk / whole * moved[1]
+                z += trunk / whole * moved[2]
+                below += lower
     still = 1.0 - walking_share
     right = (1.0 - own[0]) - own[1] * (1.0 - own[0]) * still
     left = (1.0 - own[1]) - own[0] * (1.0 - own[1]) * still
@@ -711,3 +436,52 @@ def place_hand(
             joint = keys.joint[joint]
         turned = multiply(turned, local_rotation(row, joint, stride))
     return place, normalized(turned)
+
+
+@inlined_kernel
+def blend_apex(
+    character: int,
+    arm: int,
+    weights: Any,
+    scale: Any,
+    live_pelvis: Vector,
+    live_rotation: Quaternion,
+    keys: ReachKeys,
+    state: ReachState,
+    row: Any,
+) -> tuple[Vector, Quaternion]:
+    """Blend the examples of one hand, all by themselves, at their apex.
+
+    Parameters
+    ----------
+    character, arm : int
+    weights : (N, 2, SLOTS) float64
+        `state.example_weight` or `state.example_wanted`.
+    scale : (G,) float32
+        Proportions.
+    live_pelvis, live_rotation : tuple of float
+        Pelvis of the pose below this layer, root frame, m: examples of the upper body leave it there.
+    keys : ReachKeys
+    state : ReachState
+    row : (96,) float32
+        Written: the blended pose.
+
+    Returns
+    -------
+    tuple of float, tuple of float
+        Position, m, and rotation of the pelvis, root frame.
+    """
+    row[:] = ZERO
+    leg = float(scale[keys.leg_segment])
+    moved, whole = sum_examples(character, arm, 0, APEX, weights, keys, state, row)
+    _, upper = sum_examples(character, arm, 1, APEX, weights, keys, state, row)
+    upper_share = upper / (whole + upper)
+    unit_row(row)
+    return (
+        add(scaled(moved, leg / (whole + upper)), scaled(live_pelvis, upper_share)),
+        slerp(
+            (float(row[0]), float(row[JOINTS]), float(row[2 * JOINTS]), float(row[3 * JOINTS])),
+            live_rotation,
+            upper_share,
+        ),
+    )

@@ -1,7 +1,7 @@
 """Where reaching hands want to be: targets that move and jump, and the course of each reach.
 
-A reach runs along a *course*: 0 at rest, 1 with the hand at the target, 2 at rest again. The hand seeks its
-*goal*, which glides from one target to the next with least jerk, bending away from the body.
+A reach runs along a *course*: 0 at rest, 1 with the hand at the target, 2 at rest again. When its target
+jumps, the hand *glides* to the new one, see `reach_glide`.
 """
 
 import math
@@ -33,6 +33,8 @@ APEX, END = 1.0, 2.0
 JUMPED = 0.8
 """A rotation asked for that is farther away than this has jumped, and the hand is on its way again; one that
 turns at up to 4 rad/s is followed closer, rad."""
+LEAST_SHARE = 0.01
+"""Share of a rotation that stays until a hand has glided to its target; hardly anything shows of it."""
 
 
 class ReachLimits(NamedTuple):
@@ -44,14 +46,19 @@ class ReachLimits(NamedTuple):
     """Further time by distance, s/m."""
     time_per_radian: float
     """Shortest time by how far a hand turns, against the examples or from one target to another, s/rad."""
+    time_shared: float
+    """Further time where both hands pull at the trunk, over how far inverse kinematics takes a hand, s/m."""
     acceleration: float
     """A hand that is at its target follows accelerations up to this exactly, m/s^2."""
     target_speed: float
     """Targets that move faster than this are taken to have jumped, m/s."""
-    bulge: float
-    """How far a way between targets bends away from the body, over its length."""
+    turn_acceleration: float
+    """Largest angular acceleration of joints between the blends of two targets, rad/s^2."""
+    far_turn_time: float
+    """Shortest time over the square of how far joints turn between two blends, s/rad^2: blends of far poses
+    are fast in their middle, and come beside the limits of joints there."""
     clearance: float
-    """Distance from the body's axis that ways between targets keep, m."""
+    """Distance from the body's axis that ways between targets keep in their middle, m."""
     body_radius: float
     """Targets closer to the spine than this are refused, m at the library's size."""
     turn_back: float
@@ -64,8 +71,8 @@ class ReachLimits(NamedTuple):
     """Farthest that inverse kinematics takes a hand from where the examples bring it, m."""
     missing_rate: float
     """Rate with which what could not be had is made up for, 1/s."""
-    example_rate: float
-    """Rate of the critically damped change of the examples' weights, 1/s."""
+    example_time: float
+    """Time in which the examples' weights follow those of a look-up, s."""
 
 
 class ReachState(NamedTuple):
@@ -92,14 +99,20 @@ class ReachState(NamedTuple):
     seen_velocity: npt.NDArray[np.float64]
     offset: npt.NDArray[np.float64]
     offset_velocity: npt.NDArray[np.float64]
-    offset_acceleration: npt.NDArray[np.float64]
+    nearest: npt.NDArray[np.float64]
+    lag: npt.NDArray[np.float64]
+    lag_velocity: npt.NDArray[np.float64]
+    lag_acceleration: npt.NDArray[np.float64]
     time_left: npt.NDArray[np.float64]
     plan_time: npt.NDArray[np.float64]
     bulge: npt.NDArray[np.float64]
+    glide_turn: npt.NDArray[np.float64]
+    """(N, 2, 4) How the blend turns the hand now against where the glide ends, in the frame of the latter."""
     rotation: npt.NDArray[np.float64]
     turn_velocity: npt.NDArray[np.float64]
     turn_acceleration: npt.NDArray[np.float64]
     rotation_share: npt.NDArray[np.float64]
+    rotation_rate: npt.NDArray[np.float64]
     turn: npt.NDArray[np.float64]
     """(N, 2) How far hands must turn at the apex against the examples, rad."""
     turn_before: npt.NDArray[np.float64]
@@ -107,9 +120,10 @@ class ReachState(NamedTuple):
     missing_place: npt.NDArray[np.float64]
     missing_turn: npt.NDArray[np.float64]
     example: npt.NDArray[np.int32]
-    """(N, 2, 24) Examples that are blended; slots of weight 0 are free."""
+    """(N, 2, 72) Examples that are blended; slots of weight 0 are free."""
     example_weight: npt.NDArray[np.float64]
     example_weight_rate: npt.NDArray[np.float64]
+    example_weight_acceleration: npt.NDArray[np.float64]
     example_wanted: npt.NDArray[np.float64]
     example_count: npt.NDArray[np.int32]
     """(N, 2) Slots from here on are free."""
@@ -151,6 +165,42 @@ def set_quaternion(array: Any, character: int, arm: int, value: Quaternion) -> N
         array[character, arm, component] = value[component]
 
 
+@inlined_kernel
+def settle_shares(time: float, dt: float) -> tuple[Vector, Vector, Vector]:
+    """Find the linear map of `settle`.
+
+    Parameters
+    ----------
+    time, dt : float
+        Until rest, and the step, s, > 0.
+
+    Returns
+    -------
+    tuple of tuple of float
+        What place, velocity and acceleration each add to the three after `dt`.
+    """
+    if time <= dt:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    u = dt / time
+    return (
+        (
+            1.0 - u * u * u * (10.0 - u * (15.0 - 6.0 * u)),
+            -30.0 * u * u * (1.0 - u) * (1.0 - u) / time,
+            -60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (time * time),
+        ),
+        (
+            dt * (1.0 - u * u * (6.0 - u * (8.0 - 3.0 * u))),
+            1.0 - u * u * (18.0 - u * (32.0 - 15.0 * u)),
+            -12.0 * u * (3.0 - u * (8.0 - 5.0 * u)) / time,
+        ),
+        (
+            0.5 * dt * dt * (1.0 - u) * (1.0 - u) * (1.0 - u),
+            dt * (1.0 - u * (4.5 - u * (6.0 - 2.5 * u))),
+            1.0 - u * (9.0 - u * (18.0 - 10.0 * u)),
+        ),
+    )
+
+
 @kernel
 def settle(
     place: float, velocity: float, acceleration: float, time: float, dt: float
@@ -176,20 +226,11 @@ def settle(
     **Source:** Flash, Hogan, "The coordination of arm movements", 1985: minimum-jerk motion is a quintic;
     planned anew from the present state in each step.
     """
-    if time <= dt:
-        return 0.0, 0.0, 0.0
-    u = dt / time
-    v = velocity * time
-    a = acceleration * time * time
-    distance = -place - v - 0.5 * a
-    slope = -v - a
-    c3 = 10.0 * distance - 4.0 * slope - 0.5 * a
-    c4 = -15.0 * distance + 7.0 * slope + a
-    c5 = 6.0 * distance - 3.0 * slope - 0.5 * a
+    own, per_rate, per_bend = settle_shares(time, dt)
     return (
-        place + u * (v + u * (0.5 * a + u * (c3 + u * (c4 + u * c5)))),
-        (v + u * (a + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / time,
-        (a + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / (time * time),
+        own[0] * place + per_rate[0] * velocity + per_bend[0] * acceleration,
+        own[1] * place + per_rate[1] * velocity + per_bend[1] * acceleration,
+        own[2] * place + per_rate[2] * velocity + per_bend[2] * acceleration,
     )
 
 
@@ -213,125 +254,45 @@ def is_inside_body(place: Vector, pelvis: Vector, size: float, radius: float) ->
 
 
 @inlined_kernel
-def away_from_body(place: Vector, way: Vector, limits: ReachLimits) -> Vector:
-    """Find how a straight way of a hand must bend: away from the body's axis, more where it comes close.
-
-    Parameters
-    ----------
-    place : tuple of float
-        Where it begins, root frame, m.
-    way : tuple of float
-        m.
-    limits : ReachLimits
-
-    Returns
-    -------
-    tuple of float
-        Farthest departure from the straight way, horizontal, m.
-    """
-    flat = way[0] * way[0] + way[2] * way[2]
-    share = 0.5
-    if flat > 1e-12:
-        share = min(max(-(place[0] * way[0] + place[2] * way[2]) / flat, 0.15), 0.85)
-    x = place[0] + share * way[0]
-    z = place[2] + share * way[2]
-    near = math.sqrt(x * x + z * z)
-    length = limits.bulge * norm(way) + max(limits.clearance - near, 0.0)
-    # A way through the axis goes round in front.
-    x, z = (x / near, z / near) if near > 0.05 else (0.0, 1.0)
-    return length * x, 0.0, length * z
-
-
-@inlined_kernel
-def goal_of(state: ReachState, character: int, arm: int) -> Vector:
-    """Find where the goal of a hand is now, root frame, m."""
-    goal = add(vector_of(state.seen, character, arm), vector_of(state.offset, character, arm))
-    if state.time_left[character, arm] > 0.0:
-        rise, _, _ = hump(1.0 - state.time_left[character, arm] / state.plan_time[character, arm])
-        goal = add(goal, scaled(vector_of(state.bulge, character, arm), rise))
-    return goal
-
-
-@inlined_kernel
-def follow_target(
-    character: int,
-    arm: int,
-    target: Vector,
-    turned: Quaternion,
-    limits: ReachLimits,
-    dt: float,
-    state: ReachState,
-) -> None:
-    """Advance the goal of one hand: it glides to the target, and stays with it once there.
+def see_target(
+    character: int, arm: int, target: Vector, limits: ReachLimits, dt: float, state: ReachState
+) -> bool:
+    """Note where the target of one hand is now; tells whether it has jumped or abruptly changed its velocity.
 
     Parameters
     ----------
     character, arm : int
     target : tuple of float
         Root frame, m.
-    turned : tuple of float
-        Rotation asked for, root frame.
     limits : ReachLimits
     dt : float
         s.
     state : ReachState
-        In and out.
+        In and out: `seen` and `seen_velocity`.
+
+    Returns
+    -------
+    bool
     """
     seen = vector_of(state.seen, character, arm)
-    speed = vector_of(state.seen_velocity, character, arm)
-    expected = add(seen, scaled(speed, dt))
+    expected = add(seen, scaled(vector_of(state.seen_velocity, character, arm), dt))
     velocity = scaled(subtract(target, seen), 1.0 / dt)
-    if norm(subtract(target, expected)) > limits.acceleration * dt * dt:
-        if norm(velocity) > limits.target_speed:
-            velocity = (0.0, 0.0, 0.0)
-        offset = vector_of(state.offset, character, arm)
-        rate = vector_of(state.offset_velocity, character, arm)
-        bend = vector_of(state.offset_acceleration, character, arm)
-        if state.time_left[character, arm] > 0.0:
-            # The present bend of the way becomes part of the offset, so that nothing jumps.
-            plan = state.plan_time[character, arm]
-            rise, slope, curve = hump(1.0 - state.time_left[character, arm] / plan)
-            bulge = vector_of(state.bulge, character, arm)
-            offset = add(offset, scaled(bulge, rise))
-            rate = add(rate, scaled(bulge, slope / plan))
-            bend = add(bend, scaled(bulge, curve / (plan * plan)))
-        offset = add(offset, subtract(expected, target))
-        rate = add(rate, subtract(speed, velocity))
-        time = limits.least_time + limits.time_per_metre * norm(offset)
-        time = max(time, state.time_left[character, arm])
-        state.time_left[character, arm] = time
-        state.plan_time[character, arm] = time
-        is_far = norm(offset) > 0.08
-        bulge = (0.0, 0.0, 0.0)
-        if is_far:
-            bulge = away_from_body(add(target, offset), scaled(offset, -1.0), limits)
-        set_vector(state.bulge, character, arm, bulge)
-        set_vector(state.offset, character, arm, offset)
-        set_vector(state.offset_velocity, character, arm, rate)
-        set_vector(state.offset_acceleration, character, arm, bend)
+    has_jumped = norm(subtract(target, expected)) > limits.acceleration * dt * dt
+    left = state.time_left[character, arm]
+    # One that leaves its path in two steps running has got another velocity.
+    goes_on = left > 0.0 and state.plan_time[character, arm] - left < 1.5 * dt
+    if has_jumped and (not goes_on or norm(velocity) > limits.target_speed):
+        velocity = (0.0, 0.0, 0.0)
     set_vector(state.seen, character, arm, target)
     set_vector(state.seen_velocity, character, arm, velocity)
-    left = state.time_left[character, arm]
-    for axis in range(3):
-        place, rate_now, bend_now = settle(
-            state.offset[character, arm, axis],
-            state.offset_velocity[character, arm, axis],
-            state.offset_acceleration[character, arm, axis],
-            left,
-            dt,
-        )
-        state.offset[character, arm, axis] = place
-        state.offset_velocity[character, arm, axis] = rate_now
-        state.offset_acceleration[character, arm, axis] = bend_now
-    state.time_left[character, arm] = left - dt if left > dt else 0.0
-    follow_rotation(character, arm, turned, limits, dt, state)
+    return has_jumped
 
 
 @inlined_kernel
 def follow_rotation(
     character: int, arm: int, turned: Quaternion, limits: ReachLimits, dt: float, state: ReachState
 ) -> None:
-    """Turn the goal of one hand towards the rotation that is asked for, together with its way.
+    """Turn the goal of one hand towards the rotation that is asked for, together with its glide.
 
     Parameters
     ----------
@@ -347,10 +308,6 @@ def follow_rotation(
     left = rotation_vector(multiply(quaternion_of(state.rotation, character, arm), conjugate(turned)))
     # A rotation that only drifts, as of a carried object, is followed within the least time.
     time = max(limits.time_per_radian * norm(left), limits.least_time)
-    if norm(left) > JUMPED and state.time_left[character, arm] <= 0.0:
-        state.time_left[character, arm] = time
-        state.plan_time[character, arm] = time
-        set_vector(state.bulge, character, arm, (0.0, 0.0, 0.0))
     time = max(state.time_left[character, arm], time)
     if norm(left) < 1e-4 and norm(vector_of(state.turn_velocity, character, arm)) < 1e-2:
         set_quaternion(state.rotation, character, arm, turned)
@@ -383,8 +340,10 @@ def track_target(
     limits: ReachLimits,
     dt: float,
     state: ReachState,
-) -> None:
-    """Bring the target of one hand into the root frame, and let the goal follow it; bad targets are refused.
+) -> tuple[bool, Quaternion]:
+    """Bring the target of one hand into the root frame; bad targets are refused.
+
+    Hands on their way back no longer follow their targets.
 
     Parameters
     ----------
@@ -402,6 +361,13 @@ def track_target(
         s.
     state : ReachState
         In and out.
+
+    Returns
+    -------
+    bool
+        The target has jumped, or turned far at once.
+    tuple of float
+        Rotation asked for, root frame.
     """
     facing = from_yaw(-yaw)
     target = rotate(facing, subtract(vector_of(state.target_world, character, arm), position_world))
@@ -414,8 +380,9 @@ def track_target(
     is_bad = is_bad or not math.isfinite(target[0] + target[1] + target[2])
     is_bad = is_bad or not (length > 0.5 and length < 2.0)
     is_bad = is_bad or is_inside_body(target, pelvis, size, limits.body_radius)
-    if is_bad:
-        if state.status[character, arm] != REFUSED:
+    is_left = state.stage[character, arm] == RETURN
+    if is_bad or is_left:
+        if not is_left and state.status[character, arm] != REFUSED:
             state.status[character, arm] = REFUSED
             state.refusals[character, arm] += 1
         target = vector_of(state.seen, character, arm)
@@ -428,11 +395,56 @@ def track_target(
         set_quaternion(state.rotation, character, arm, normalized(turned))
         set_vector(state.turn_velocity, character, arm, (0.0, 0.0, 0.0))
         set_vector(state.turn_acceleration, character, arm, (0.0, 0.0, 0.0))
-    follow_target(character, arm, target, normalized(turned), limits, dt, state)
-    asked = share if is_bad else (1.0 if wants else 0.0)
+    turned = normalized(turned)
+    has_jumped = see_target(character, arm, target, limits, dt, state)
+    if state.time_left[character, arm] <= 0.0:
+        left = rotation_vector(multiply(quaternion_of(state.rotation, character, arm), conjugate(turned)))
+        has_jumped = has_jumped or norm(left) > JUMPED
+    asked = share if is_bad or is_left else (1.0 if wants else 0.0)
     time = max(limits.time_per_radian * state.turn[character, arm], 1.0 / limits.rotation_rate)
-    step = dt / time
-    state.rotation_share[character, arm] = share + min(max(asked - share, -step), step)
+    if state.time_left[character, arm] > 0.0:
+        time = max(time, state.plan_time[character, arm])
+    wanted_rate = 0.0 if asked == share else math.copysign(1.0 / time, asked - share)
+    glides = has_jumped or state.time_left[character, arm] > 0.0
+    if share <= 0.0 and glides:
+        wanted_rate = 0.0
+    rate = state.rotation_rate[character, arm]
+    rate = paced(rate, wanted_rate, 1.0 / time, share in (0.0, 1.0), limits, dt)
+    state.rotation_rate[character, arm] = rate
+    moved = share + rate * dt
+    if asked != share and (moved - asked) * (share - asked) <= 0.0:
+        moved = asked
+    # Hands that are held to a rotation, or no longer, in midway would turn on with another velocity.
+    least = LEAST_SHARE if share > 0.0 and glides else 0.0
+    state.rotation_share[character, arm] = min(max(moved, least), 1.0)
+    return has_jumped, turned
+
+
+@inlined_kernel
+def paced(now: float, wanted: float, usual: float, is_at_rest: bool, limits: ReachLimits, dt: float) -> float:
+    """Change the rate of a course towards another one: at once where it is at rest, else gradually.
+
+    Parameters
+    ----------
+    now, wanted : float
+        1/s.
+    usual : float
+        Rate of the way there, 1/s: the faster, the faster rates change.
+    is_at_rest : bool
+    limits : ReachLimits
+    dt : float
+        s.
+
+    Returns
+    -------
+    float
+        1/s.
+    """
+    if is_at_rest:
+        return wanted
+    fastest = max(usual, abs(now))
+    change = limits.turn_back * fastest * fastest * dt
+    return now + min(max(wanted - now, -change), change)
 
 
 @inlined_kernel
@@ -470,12 +482,7 @@ def advance_course(
         wanted = rate
     elif course > APEX:
         wanted = -return_rate
-    if course in (0.0, APEX):
-        now = wanted
-    else:
-        fastest = max(rate, abs(now))
-        change = limits.turn_back * fastest * fastest * dt
-        now += min(max(wanted - now, -change), change)
+    now = paced(now, wanted, rate, course in (0.0, APEX), limits, dt)
     moved = course + now * dt
     # Courses stop at the apex, whose pose all sections share.
     if (course < APEX and moved > APEX - 1e-9) or (course > APEX and moved < APEX + 1e-9):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import crowd
-from crowd.bench.reach import LARGEST_RATIO, angular_motion
+from crowd.bench.reach import LARGEST_RATIO
+from crowd.bench.reachers import angular_motion
 from crowd.controllers.grab import GrabStatus
 from crowd.motion.rotation import conjugate, multiply
 from crowd.motion.swing_twist import FINGERS, swing_twist_limits

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import crowd
-from crowd.bench.reach import Reachers, random_targets
+from crowd.bench.reachers import Reachers, random_targets
 from crowd.bench.sweep import sweep
 from crowd.cli import exit_code
 from crowd.motion.body import build_skeleton

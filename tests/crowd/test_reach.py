@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import crowd
-from crowd.bench.reach import Reachers
+from crowd.bench.reachers import Reachers
 from crowd.controllers.reach import require_lanes
 from crowd.errors import MotionError, SettingsError
 from crowd.motion.rotation import conjugate, multiply, to_vector

@@ -7,16 +7,14 @@ from crowd.bench.reach import (
     FASTEST,
     LARGEST_JITTER,
     LARGEST_RATIO,
+    TOLERANCE,
     TURNING,
     TWIST,
-    Reachers,
-    angular_motion,
-    example_acceleration,
-    random_targets,
-    random_turns,
     run_batch,
+    send_on,
 )
-from crowd.motion.rotation import conjugate, from_vector, multiply
+from crowd.bench.reachers import JointMotion, Reachers, angular_motion, random_targets, random_turns
+from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate
 from crowd_kernels.reach_goal import HOLD, MOVING, OUT_OF_REACH, REACHED
 
 PEOPLE = 60
@@ -46,8 +44,7 @@ def before_the_body(reachers, hand, rng):
 
 
 def allowed(reachers):
-    clips = tuple(clip for part in reachers.space.examples for clip in part.clips)
-    return LARGEST_RATIO * example_acceleration(clips, reachers.space.keys.joint)
+    return LARGEST_RATIO * reachers.largest_example_acceleration
 
 
 @pytest.mark.parametrize("first", [0, 1])
@@ -66,6 +63,137 @@ def test_nothing_jumps_when_the_second_hand_comes_and_goes_while_the_first_one_h
     shown += frames(reachers, 110)
     assert not simulation.state.reach_stage.any()
     assert angular_motion(np.array(shown), simulation.dt)[1] < allowed(reachers)
+
+
+def sent_on(reachers, hand, has_rotation, rng):
+    """Targets and rotations of hands that are sent on: anywhere, or to and fro where rotations are known."""
+    anywhere = [random_targets(reachers, hand, rng, is_far=False) for _ in range(6)]
+    if not has_rotation:
+        return anywhere, [None] * 6
+    ends = [run_batch(reachers, hand, target, None) for target in anywhere[:2]]
+    way = [ends[time % 2] for time in range(5)]
+    # Rotations are asked for, let go and asked for again on the way.
+    return [end.target for end in way], [end.rotation if time != 2 else None for time, end in enumerate(way)]
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+@pytest.mark.parametrize("has_rotation", [False, True])
+def test_hands_that_are_sent_on_at_any_time_go_smoothly_to_their_last_target(hand, has_rotation, rng):
+    """Between any targets in reach: behind and before, above the head and at the floor."""
+    reachers = Reachers(200, seed=2)
+    for _ in range(3):
+        reachers.step()
+    targets, rotations = sent_on(reachers, hand, has_rotation, rng)
+    outcome = send_on(reachers, hand, targets, rotations, rng)
+    assert (outcome.status == REACHED).all()
+    assert np.linalg.norm(outcome.place - targets[-1], axis=1).max() < TOLERANCE
+    assert outcome.acceleration < allowed(reachers)
+    assert outcome.speed < FASTEST
+    assert not reachers.simulation.state.reach_stage.any(), "hands have returned"
+
+
+@pytest.mark.parametrize("walking", [0.0, 0.5])
+def test_hands_that_are_sent_on_again_and_again_keep_a_pose(walking, rng):
+    """More and more examples fade, of the whole body and of the upper one; people meet their last target."""
+    reachers = Reachers(PEOPLE, seed=5)
+    state = reachers.simulation.state
+    for frame in range(200):
+        state.locomotion_weight[:] = walking
+        if frame % 8 == 0:
+            target = random_targets(reachers, 0, rng, is_far=False)
+            reachers.reach(0, target)
+        reachers.step()
+        used = (state.reach_example_weight[:, 0] != 0) | (state.reach_example_wanted[:, 0] != 0)
+        assert np.isfinite(reachers.local_rotations()).all()
+        np.testing.assert_allclose(state.reach_example_wanted[:, 0].sum(axis=1), 1.0, atol=1e-9)
+    assert used.sum(axis=1).max() > 32, "the test asks for many"
+    for _ in range(260):
+        state.locomotion_weight[:] = 0.0
+        reachers.step()
+    assert np.linalg.norm(reachers.hand(0)[0] - target, axis=1).max() < TOLERANCE
+
+
+def test_a_hand_that_is_let_go_on_its_way_to_another_place_does_not_linger(reachers, rng):
+    state, end = reachers.simulation.state, reachers.simulation.reach.end
+    reachers.reach(0, random_targets(reachers, 0, rng, is_far=False))
+    frames(reachers, 25)
+    reachers.reach(0, random_targets(reachers, 0, rng, is_far=False))
+    frames(reachers, 6)
+    end(state, reachers.rows, 0)
+    frames(reachers, 90)
+    assert not state.reach_stage.any()
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+def test_what_is_wanted_may_change_while_a_hand_glides(reachers, hand, rng):
+    """A turned grip carries the wrist along, and people sit down: neither makes the arm jump."""
+    state = reachers.simulation.state
+    first, second = (run_batch(reachers, hand, before_the_body(reachers, hand, rng), None) for _ in range(2))
+    turned = multiply(from_vector(0.5 * random_turns(PEOPLE, rng)), second.rotation)
+    state.reach_point_hand[:, hand] = (0.0, -0.09, 0.0)
+    reachers.reach(hand, first.target, first.rotation)
+    shown = frames(reachers, 100)
+    for rotation in (second.rotation, turned):
+        reachers.reach(hand, second.target, rotation)
+        shown += frames(reachers, 12)
+    shown += frames(reachers, 150)
+    assert angular_motion(np.array(shown), reachers.simulation.dt)[1] < allowed(reachers)
+    reachers.reach(hand, first.target, None)
+    shown = shown[-2:] + frames(reachers, 8)
+    state.is_seated[:] = True
+    shown += frames(reachers, 150)
+    assert angular_motion(np.array(shown), reachers.simulation.dt)[1] < 2 * allowed(reachers)
+
+
+def test_a_second_hand_keeps_the_time_that_is_asked(reachers, rng):
+    reachers.reach(0, before_the_body(reachers, 0, rng))
+    frames(reachers, 90)
+    reachers.reach(1, before_the_body(reachers, 1, rng))
+    reachers.simulation.state.reach_seconds[:, 1] = 0.8
+    frames(reachers, 50)
+    assert (reachers.simulation.state.reach_course[:, 1] == 1.0).all()
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+def test_targets_may_move_and_turn_while_hands_glide_to_them(hand, rng):
+    reachers = Reachers(100, seed=4)
+    state = reachers.simulation.state
+    for _ in range(3):
+        reachers.step()
+    ends = [
+        run_batch(reachers, hand, random_targets(reachers, hand, rng, is_far=False), None) for _ in range(2)
+    ]
+    way, turning = 0.15 * random_turns(100, rng), 0.3 * random_turns(100, rng)
+    motion = JointMotion(reachers.simulation.dt)
+    for frame in range(360):
+        end = ends[frame // 120 % 2]
+        swing = np.sin(2 * np.pi * frame / 90) * 90 / (2 * np.pi) / 60
+        target, rotation = end.target + way * swing, multiply(from_vector(turning * swing), end.rotation)
+        if frame % 120 == 0:
+            reachers.reach(hand, target, rotation)
+        facing = about(1, state.yaw)
+        state.reach_target_world[:, hand] = rotate(facing, target) + state.position_world
+        state.reach_target_rotation_world[:, hand] = multiply(facing, rotation)
+        reachers.step()
+        motion.add(reachers.local_rotations())
+    assert np.median(np.linalg.norm(reachers.hand(hand)[0] - target, axis=1)) < 1e-3
+    assert motion.acceleration < allowed(reachers)
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+def test_hands_that_turn_back_while_they_are_sent_on_do_not_stop_dead(reachers, hand, rng):
+    state, end = reachers.simulation.state, reachers.simulation.reach.end
+    reachers.reach(hand, random_targets(reachers, hand, rng, is_far=False))
+    shown = frames(reachers, 90)
+    for wait in (10, 25):
+        reachers.reach(hand, random_targets(reachers, hand, rng, is_far=False))
+        shown += frames(reachers, wait)
+        end(state, reachers.rows, hand)
+        shown += frames(reachers, wait)
+    reachers.reach(hand, random_targets(reachers, hand, rng, is_far=False))
+    shown += frames(reachers, 180)
+    assert (state.reach_status[:, hand] == REACHED).all()
+    assert angular_motion(np.array(shown), reachers.simulation.dt)[1] < allowed(reachers)
 
 
 @pytest.mark.parametrize("hand", [0, 1])
@@ -153,11 +281,11 @@ def test_joints_slow_down_before_their_limits_wherever_they_cross_them(hand, rng
         reachers.step()
     target = random_targets(reachers, hand, rng, is_far=True)
     turned = multiply(from_vector(TWIST * random_turns(400, rng)), reachers.hand(hand)[1])
-    _, _, status, speed, acceleration, jitter = run_batch(reachers, hand, target, turned, TURNING)
-    assert (status == OUT_OF_REACH).all()
-    assert speed < FASTEST
-    assert acceleration < allowed(reachers)
-    assert jitter < LARGEST_JITTER
+    outcome = run_batch(reachers, hand, target, turned, TURNING)
+    assert (outcome.status == OUT_OF_REACH).all()
+    assert outcome.speed < FASTEST
+    assert outcome.acceleration < allowed(reachers)
+    assert outcome.jitter < LARGEST_JITTER
 
 
 def test_a_held_target_that_turns_is_followed_in_human_time(reachers, rng):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crowd.bench.reach import Reachers
+from crowd.bench.reachers import Reachers
 from crowd.controllers.reach import REACH_LIMITS
 from crowd.motion.rotation import multiply
 from crowd_kernels.reach import carried_hand, reach_crowd

@@ -84,3 +84,12 @@ def status(stage, before, is_there, is_turned, hold_left):
     if stage in (1, 2) and before == 4:
         after = 4
     return after, 3 if stage == 2 and hold_left < 0 else stage
+
+
+def shortened(size, longest):
+    """Length of a way after `shortened`: its slope falls from 1 to 0 from the longest to twice as far."""
+    if size <= longest:
+        return size
+    beyond = np.linspace(0.0, min(size / longest - 1.0, 1.0), 4001)
+    risen = np.trapezoid(1.0 - minimum_jerk(beyond), beyond)
+    return longest * (1.0 + risen - 0.65 * minimum_jerk(beyond[-1]))
