@@ -14,7 +14,7 @@ SLOTS = 72
 that are sent on again and again blend more and more of them."""
 STRAYED = 0.05
 """Examples of a gliding hand are looked up again when its target has moved as far as this, m."""
-SHARE_STEP = 0.1
+SHARE_STEP = 0.5
 """Share of the upper body's examples that comes or goes in one step when people sit down."""
 LEAST_WEIGHT = 1e-4
 """Weights that fade end here."""
