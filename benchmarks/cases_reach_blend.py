@@ -123,6 +123,10 @@ def set_up(size: int, rng: np.random.Generator) -> MovingHands:
         aligned_zeros((size, 2, 4), np.float32),
         aligned_zeros((size, 2), np.float32),
     )
+    # Reaches begin at rest, where they take up their examples.
+    hands.course = np.zeros_like(course)
+    run(hands)
+    hands.course = course
     for _ in range(SETTLING):
         run(hands)
     return hands
@@ -251,7 +255,7 @@ def blend(hands: MovingHands, weight: FloatArray, course: FloatArray) -> tuple[F
     keys = hands.reachers.space.keys
     rotation, pelvis = np.zeros((len(weight), 4 * JOINTS)), np.zeros((len(weight), 3))
     for clip in range(weight.shape[1]):
-        rows = np.flatnonzero(weight[:, clip] > 0.0)
+        rows = np.flatnonzero(weight[:, clip] != 0.0)
         place = course[rows] * keys.apex[clip]
         before = np.minimum(place.astype(np.int64), keys.key_count[clip] - 2)
         later = (place - before)[:, None]
