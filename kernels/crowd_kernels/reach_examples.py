@@ -264,7 +264,7 @@ def find_examples(
     Returns
     -------
     bool
-        A glide begins: the target has jumped, or the person sits down, stands up or begins to walk.
+        A glide begins: the target has jumped, or the person sits down or stands up.
     bool
         Others are wanted than before where the hand glides.
 

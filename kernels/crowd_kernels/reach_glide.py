@@ -82,7 +82,6 @@ def largest_turn(row: Any, other: Any) -> float:
             + row[2 * JOINTS + k] * other[2 * JOINTS + k]
             + row[3 * JOINTS + k] * other[3 * JOINTS + k]
         )
-        # Joints without a skeleton's joint have length 0 or 1.
         least = min(least, float(cosine))
     return 2.0 * math.acos(max(least, -1.0))
 
