@@ -19,8 +19,8 @@ from crowd_kernels.easing import minimum_jerk
 from crowd_kernels.reach import CHUNKS, reach_crowd
 from crowd_kernels.reach_blend import CHAIN, JOINTS, SCRATCH_ROW
 from crowd_kernels.reach_examples import SAME_PLACE
-from crowd_kernels.reach_goal import ReachState
 from crowd_kernels.reach_space import NEAREST
+from crowd_kernels.reach_state import ReachState
 
 ROUNDS = 32
 RADIUS = 0.05
@@ -59,7 +59,7 @@ class MovingHands:
         State of the reaches as kernels take it.
     number, real, rows : array
         What the kernel works in.
-    task, place, rotation, kept : array
+    task, place, rotation, kept, bound, rests : array
         What `reach_crowd` asks of inverse kinematics.
     round : int
     """
@@ -81,6 +81,8 @@ class MovingHands:
     place: npt.NDArray[np.float32]
     rotation: npt.NDArray[np.float32]
     kept: npt.NDArray[np.float32]
+    bound: npt.NDArray[np.float32]
+    rests: npt.NDArray[np.uint8]
     round: int = 0
 
 
@@ -122,6 +124,8 @@ def set_up(size: int, rng: np.random.Generator) -> MovingHands:
         aligned_zeros((size, 2, 3), np.float32),
         aligned_zeros((size, 2, 4), np.float32),
         aligned_zeros((size, 2), np.float32),
+        aligned_zeros((size, 2), np.float32),
+        aligned_zeros(size, np.uint8),
     )
     # Reaches begin at rest, where they take up their examples.
     hands.course = np.zeros_like(course)
@@ -159,6 +163,7 @@ def run(hands: MovingHands) -> None:
         hands.real,
         hands.rows,
         state.reach_correction,
+        state.reach_correction_change,
         state.reach_last_rotation,
         hands.pose,
         hands.pelvis,
@@ -166,6 +171,8 @@ def run(hands: MovingHands) -> None:
         hands.place,
         hands.rotation,
         hands.kept,
+        hands.bound,
+        hands.rests,
     )
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from crowd.controllers.grab import HOLDING
 from crowd.motion.rotation import rotate
-from crowd_kernels.reach_goal import REACHED
+from crowd_kernels.reach_state import REACHED
 
 if TYPE_CHECKING:
     from crowd.simulation import Simulation

@@ -218,8 +218,8 @@ class State:
     """Goal of the hand against where the blended examples have it at their apex, m. (character, 2, 3)"""
     reach_offset_velocity: FloatArray = _array(2, 3)
     """m/s. (character, 2, 3)"""
-    reach_nearest: FloatArray = _array(2, 3)
-    """Offset that would bring the hand to its target in the last step, m. (character, 2, 3)"""
+    reach_away: FloatArray = _array(2, 3)
+    """How the other hand's examples take the hand away from where its own have it, m. (character, 2, 3)"""
     reach_lag: FloatArray = _array(2, 3)
     """What is left of the glide of `reach_offset` to a new target, m. (character, 2, 3)"""
     reach_lag_velocity: FloatArray = _array(2, 3)
@@ -277,6 +277,8 @@ class State:
     reach_correction: Float32Array = _array(3 * CORRECTED_JOINTS, dtype=np.float32)
     """What inverse kinematics turned joints against the blended motion in the last step: vector parts, x of
     all joints of the tree, then y, z; 0 for none. (character, 96)"""
+    reach_correction_change: Float32Array = _array(3 * CORRECTED_JOINTS, dtype=np.float32)
+    """How that has changed in the last step. (character, 96)"""
     reach_last_rotation: Float32Array = _array(4 * PADDED_JOINTS, dtype=np.float32)
     """Joints as inverse kinematics left them in the last step; 0 for none. (character, 256)"""
 

@@ -10,13 +10,13 @@ import numpy.typing as npt
 from crowd.bench.reachers import FloatArray, JointMotion, Reachers, random_targets, random_turns
 from crowd.blending.reach_space import SIDES
 from crowd.motion.rotation import conjugate, from_vector, multiply, to_vector
-from crowd_kernels.reach_goal import OUT_OF_REACH, REACHED
+from crowd_kernels.reach_state import OUT_OF_REACH, REACHED
 
 PEOPLE = 1000
 GOING, COMING = 85, 110
 """Frames in which every hand has come to its target, and back to rest."""
 TURNING = 80
-"""Further frames for hands that must turn far, to their targets and back each."""
+"""Further frames for hands that turn far, to their targets and back each, or that turn round on their way."""
 TILT = math.radians(20.0)
 """Largest turn of a rotation that is asked for against that of the examples, rad."""
 TWIST = math.radians(140.0)
@@ -25,9 +25,13 @@ SENT_ON = 4
 """How often hands that are sent on get another target."""
 SOON, LATE = 4, 50
 """Least and largest time between such targets, frames: on the way to them, and while hands wait."""
+SWAY, SWAY_TURN = 0.16, 0.32
+"""Way of targets that move, m, and how far they turn, rad: at up to 0.25 m/s and 0.5 rad/s."""
+SWAYING = 120
+"""Frames of such a way, there and back, which they go twice."""
 TOGETHER = 40
 """Largest time between the starts, or the ends, of both hands, frames."""
-BOTH_GOING = 170
+BOTH_GOING = 260
 """Frames in which both hands have come to their targets, or nearest to them, and back to rest."""
 WATCHED = 10
 """Frames over which hands that wait are watched."""
@@ -169,9 +173,17 @@ def send_on(
     targets: Sequence[FloatArray],
     rotations: Sequence[FloatArray | None],
     rng: np.random.Generator,
+    moves: bool = False,
 ) -> Outcome:
-    """Reach for one target after the other without returning, each at a random time; judged is the last."""
+    """Reach for one target after the other without returning, each at a random time; judged is the last.
+
+    Where targets move they sway in any direction and turn about any axis, jump in the middle of that, and
+    rest at last where they were given.
+    """
     run = Run(reachers)
+    people = len(reachers.rows)
+    direction, axis = random_turns(people, rng), random_turns(people, rng)
+    begun = np.zeros(people, np.int64)
     due = rng.integers(SOON, LATE, (len(targets), len(reachers.rows)))
     due[0] = 0
     due = due.cumsum(axis=0)
@@ -181,12 +193,24 @@ def send_on(
             rows = reachers.rows[begin == frame]
             if rows.size:
                 reachers.reach(hand, target, rotation, rows)
+                begun[rows] = frame
+            if moves:
+                away = SWAY * sway(frame - begun)[:, None]
+                turn = from_vector(SWAY_TURN * sway(frame - begun)[:, None] * axis)
+                turned = None if rotation is None else multiply(turn, rotation)
+                reachers.move(hand, target + away * direction, turned, reachers.rows[begin == begun])
 
-    run.step(int(due.max()) + GOING + TURNING, start)
+    swaying = 2 * SWAYING if moves else 0
+    run.step(int(due.max()) + swaying + GOING + 2 * TURNING, start)
     (jitter,) = run.wait((hand,))
     outcome = run.outcome(hand, targets[-1], rotations[-1])
     run.end((hand,), np.zeros((len(reachers.rows), 1), np.int64), COMING)
     return Outcome(*outcome, run.motion.speed, run.motion.acceleration, jitter)
+
+
+def sway(frames: npt.NDArray[np.int64]) -> FloatArray:
+    """How far targets are on their way there and back, 0 to 1, some frames (N,) after they came."""
+    return np.where(frames < 2 * SWAYING, 0.5 - 0.5 * np.cos(2.0 * np.pi * frames / SWAYING), 0.0)
 
 
 def run_both(reachers: Reachers, rng: np.random.Generator, times: int) -> list[Outcome]:
@@ -264,6 +288,7 @@ def sent_outcomes(
     return {
         "sent on": send_on(reachers, hand, targets, [None] * len(targets), rng),
         "sent on, rotation": send_on(reachers, hand, [end.target for end in way], some, rng),
+        "moving": send_on(reachers, hand, [end.target for end in way], list(turned), rng, moves=True),
     }
 
 

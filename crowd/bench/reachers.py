@@ -89,6 +89,16 @@ class Reachers:
         turned = None if rotation is None else multiply(facing, rotation[rows])
         self.simulation.reach.start(state, rows, hand, world, turned)
 
+    def move(
+        self, hand: int, target: FloatArray, rotation: FloatArray | None, rows: npt.NDArray[np.int32]
+    ) -> None:
+        """Move the targets of reaches that are on: as in `reach`, but without anything new beginning."""
+        state = self.simulation.state
+        facing = about(1, state.yaw[rows])
+        state.reach_target_world[rows, hand] = rotate(facing, target[rows]) + state.position_world[rows]
+        if rotation is not None:
+            state.reach_target_rotation_world[rows, hand] = multiply(facing, rotation[rows])
+
     def hand(self, hand: int) -> tuple[FloatArray, FloatArray]:
         """Positions (N, 3) and rotations (N, 4) of a hand in the root frame."""
         joint = self.simulation.model.skeleton.joint(f"{SIDES[hand]}_hand")

@@ -16,7 +16,8 @@ from crowd.motion.easing import minimum_jerk
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, to_vector
 from crowd.people import shoulders_world
 from crowd.state import BoolArray, FloatArray, IntArray, State
-from crowd_kernels.reach_goal import HOLD, MOVE, MOVING, OUT_OF_REACH, REFUSED, is_inside_body
+from crowd_kernels.reach_goal import is_inside_body
+from crowd_kernels.reach_state import HOLD, MOVE, MOVING, OUT_OF_REACH, REFUSED
 
 FREE, PLACING, CARRYING, STOPPED, WAITING = range(5)
 """Stages: nothing between both hands; it goes to or stays at a place in the world; it is kept before the

@@ -17,7 +17,7 @@ from crowd_kernels.hold import aim_holds, apply_holds, hold_effectors
 from crowd_kernels.ik import CHUNKS, SETTINGS, SolveSettings, scratch_length, solve_crowd
 from crowd_kernels.ik_gather import POSITION, ROTATION_TOO
 from crowd_kernels.ik_tree import TreeArrays
-from crowd_kernels.reach_goal import HOLD
+from crowd_kernels.reach_state import HOLD
 
 EFFECTORS = ("right_hand", "left_hand", "head")
 """Joints that can be held, in the order of the state's effector axis: hands as everywhere, then the head."""

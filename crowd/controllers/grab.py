@@ -21,7 +21,7 @@ from crowd.people import HANDING_HEIGHT
 from crowd.state import BoolArray, FloatArray, IntArray, State
 from crowd.world.objects import ObjectState
 from crowd.world.shape_table import shape_table
-from crowd_kernels import reach_goal
+from crowd_kernels import reach_state
 from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.grasp import CHUNKS, close_hands, measure_gaps
 from crowd_kernels.hand_placement import TOO_BIG
@@ -391,7 +391,7 @@ class Grab:
             return reason
         giver = objects.holder[known]
         is_others = exists & (giver >= 0) & (giver != rows)
-        offers = ((state.reach_stage[giver] != reach_goal.NONE) & objects.holder_hand[known]).any(axis=1)
+        offers = ((state.reach_stage[giver] != reach_state.NONE) & objects.holder_hand[known]).any(axis=1)
         reason[is_others & ~offers & ~closed] = GrabStatus.TAKEN
         return reason
 
@@ -407,13 +407,13 @@ class Grab:
     def _is_brought(self, state: State, rows: IntArray, items: IntArray) -> BoolArray:
         """Which objects others, or other hands, are still bringing to where they hold them out."""
         holder = self.objects.holder[items]
-        moves = (state.reach_stage[holder] == reach_goal.MOVE) & self.objects.holder_hand[items]
+        moves = (state.reach_stage[holder] == reach_state.MOVE) & self.objects.holder_hand[items]
         return np.asarray((holder >= 0) & moves.any(axis=1))
 
     def _bring_before_body(self, state: State, hands: Hands, items: IntArray) -> None:
         """Let hands that hold objects at the side bring them to where the other hand takes them."""
         rests = self.holding.held_by(hands, items)
-        rests &= np.isin(state.reach_stage[hands], (reach_goal.NONE, reach_goal.RETURN))
+        rests &= np.isin(state.reach_stage[hands], (reach_state.NONE, reach_state.RETURN))
         rows, side, items = hands[0][rests], hands[1][rests], items[rests]
         if rows.size == 0:
             return
@@ -483,10 +483,10 @@ class Grab:
         lost = (holder >= 0) & (holder != rows) & (holder != state.grab_giver[hands])
         lost &= state.grab_purpose[hands] != TOUCH
         self._give_up(state, (rows[lost], side[lost]), GrabStatus.TAKEN)
-        refused = ~lost & (state.reach_status[hands] == reach_goal.REFUSED)
+        refused = ~lost & (state.reach_status[hands] == reach_state.REFUSED)
         self._give_up(state, (rows[refused], side[refused]), GrabStatus.REFUSED)
         stays = ~lost & ~refused
-        far = stays & (state.reach_status[hands] == reach_goal.OUT_OF_REACH)
+        far = stays & (state.reach_status[hands] == reach_state.OUT_OF_REACH)
         state.grab_status[rows[stays], side[stays]] = np.where(
             far[stays], GrabStatus.OUT_OF_REACH, GrabStatus.APPROACHING
         )

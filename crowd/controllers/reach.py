@@ -30,17 +30,9 @@ from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crow
 from crowd_kernels.reach import CHUNKS, reach_crowd
 from crowd_kernels.reach_blend import SCRATCH_ROW
 from crowd_kernels.reach_correction import LANES, keep_corrections, start_solves
-from crowd_kernels.reach_goal import (
-    MOVE,
-    MOVING,
-    NONE,
-    REFUSED,
-    RETURN,
-    ReachLimits,
-    ReachState,
-    reach_status_crowd,
-)
 from crowd_kernels.reach_missing import find_missing_crowd
+from crowd_kernels.reach_state import MOVE, MOVING, NONE, REFUSED, RETURN, ReachLimits, ReachState
+from crowd_kernels.reach_status import reach_status_crowd
 
 REACH_LIMITS = ReachLimits(
     least_time=0.25,
@@ -58,7 +50,7 @@ REACH_LIMITS = ReachLimits(
     rotation_rate=3.0,
     farthest=0.13,
     missing_rate=8.0,
-    example_time=0.25,
+    example_time=0.4,
 )
 SOLVE = SETTINGS._replace(
     reach=1e3,
@@ -94,6 +86,11 @@ class ReachSettings:
     fade_rate: float = 6.0
     """Rate with which turns of joints fade that the targets do not ask for, 1/s. Where it is larger, hands
     stop short of rotations far from the blended ones, since damped steps make up for less than fades."""
+    correction_acceleration: float = 40.0
+    """Largest angular acceleration of what inverse kinematics turns joints, rad/s^2."""
+    least_speed: float = 0.06
+    """Where both hands wait that cannot both be where they should, joints turn faster than this or rest,
+    rad/s."""
     limit_rate: float = 8.0
     """Rate with which joints approach their limits at most, 1/s; larger: harder stops."""
     tolerance: float = 7e-4
@@ -129,6 +126,7 @@ class Reach:
         "reach_count",
         "reach_checked_world",
         "reach_correction",
+        "reach_correction_change",
         "reach_last_rotation",
         *(f"reach_{name}" for name in ReachState._fields),
     )
@@ -159,6 +157,8 @@ class Reach:
         self._task = aligned_zeros((capacity, 2), np.uint8)
         self._point = aligned_zeros((capacity, 2, 3), np.float32)
         self._target = aligned_zeros((capacity, 2, 3), np.float32)
+        self._bound = aligned_zeros((capacity, 2), np.float32)
+        self._rests = aligned_zeros(capacity, np.uint8)
         self._kept = aligned_zeros((capacity, 2), np.float32)
         self._target_rotation = aligned_zeros((capacity, 2, 4), np.float32)
         self._status = aligned_zeros((capacity, 2), np.uint8)
@@ -186,6 +186,7 @@ class Reach:
         state.reach_stage[characters] = NONE
         state.reach_status[characters] = NONE
         state.reach_correction[characters] = 0.0
+        state.reach_correction_change[characters] = 0.0
         state.reach_last_rotation[characters] = 0.0
 
     def start(
@@ -244,6 +245,7 @@ class Reach:
         is_new |= state.reach_course[characters, hands] == 0.0
         rests = (state.reach_stage[characters] == NONE).all(axis=1)
         state.reach_correction[characters[rests]] = 0.0
+        state.reach_correction_change[characters[rests]] = 0.0
         state.reach_last_rotation[characters[rests]] = 0.0
         state.reach_status[characters, hands] = np.where(is_good, MOVING, REFUSED)
         state.reach_refusals[characters, hands] += ~is_good
@@ -253,7 +255,7 @@ class Reach:
         for name in (
             "offset",
             "offset_velocity",
-            "nearest",
+            "away",
             "lag",
             "lag_velocity",
             "lag_acceleration",
@@ -346,6 +348,7 @@ class Reach:
             self._real,
             self._rows,
             state.reach_correction,
+            state.reach_correction_change,
             state.reach_last_rotation,
             state.pose_rotation,
             state.pose_pelvis,
@@ -353,6 +356,8 @@ class Reach:
             self._target,
             self._target_rotation,
             self._kept,
+            self._bound,
+            self._rests,
         )
         blended = time.perf_counter()
         self._solve(state, reaching, step.dt)
@@ -365,8 +370,8 @@ class Reach:
             reaching,
             state.pose_rotation,
             state.pose_pelvis,
-            self._distance,
             parts,
+            self._distance,
             self._angle,
         )
         self.part_seconds["blending"] += blended - begin
@@ -379,11 +384,13 @@ class Reach:
 
     def _solve(self, state: State, reaching: IntArray, dt: float) -> None:
         """Bring hands to their targets, from the blended poses turned as the last solutions were."""
+        settings = self.settings
         np.copyto(self._point, state.reach_point_hand, casting="same_kind")
         start_solves(
             self._tree,
             self._task,
             self._kept,
+            self._bound,
             state.reach_correction,
             state.pose_rotation,
             reaching,
@@ -418,11 +425,16 @@ class Reach:
             )
         keep_corrections(
             self._tree,
+            0.5 * settings.correction_acceleration * dt * dt,
+            0.5 * settings.least_speed * dt,
+            self._rests,
             self._solution,
             reaching,
             state.pose_rotation,
             state.reach_correction,
+            state.reach_correction_change,
             state.reach_last_rotation,
+            self._distance,
         )
 
     def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:

@@ -29,7 +29,7 @@ from crowd.tasks.present_task import (
 from crowd.tasks.settle import settle_parameters
 from crowd.tasks.task_list import Hand, Target, TaskKind
 from crowd.tasks.waits import Outcome
-from crowd_kernels.reach_goal import NONE
+from crowd_kernels.reach_state import NONE
 
 if TYPE_CHECKING:
     from crowd.tasks.execution import Tasks

@@ -15,7 +15,7 @@ from crowd.state import BoolArray, IntArray
 from crowd.tasks.present_task import does
 from crowd.tasks.settle import is_settled
 from crowd.tasks.task_list import Hand, TaskKind
-from crowd_kernels.reach_goal import HOLD, NONE, OUT_OF_REACH, REACHED, REFUSED
+from crowd_kernels.reach_state import HOLD, NONE, OUT_OF_REACH, REACHED, REFUSED
 
 if TYPE_CHECKING:
     from crowd.tasks.execution import Tasks

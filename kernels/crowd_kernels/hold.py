@@ -11,8 +11,8 @@ from crowd_kernels.ik import NONE
 from crowd_kernels.ik_gather import POSITION, ROTATION_TOO
 from crowd_kernels.ik_tree import TreeArrays
 from crowd_kernels.quaternion import Quaternion, conjugate, from_yaw, multiply, normalized, rotate
-from crowd_kernels.reach_goal import NONE as NO_REACH
-from crowd_kernels.reach_goal import RETURN
+from crowd_kernels.reach_state import NONE as NO_REACH
+from crowd_kernels.reach_state import RETURN
 from crowd_kernels.vector import Vector, add, scaled, subtract
 
 CHUNKS = 32

@@ -4,270 +4,43 @@ import math
 from typing import Any
 
 from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
-from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.easing import minimum_jerk
-from crowd_kernels.quaternion import (
-    Quaternion,
-    conjugate,
-    from_rotation_vector,
-    multiply,
-    normalized,
-    rotate,
-    rotation_vector,
-    slerp,
-)
-from crowd_kernels.reach_blend import (
-    CHAIN,
-    ROW,
-    ReachKeys,
-    blend_body,
-    bone_of,
-    local_rotation,
-    pelvis_of,
-    place_hand,
-)
-from crowd_kernels.reach_correction import LANES as CORRECTED
+from crowd_kernels.reach_aim import SHARED_TRUNK, aim_hand
+from crowd_kernels.reach_blend import ReachKeys, blend_body
+from crowd_kernels.reach_course import advance_course, course_shares
 from crowd_kernels.reach_examples import find_examples, follow_weights
-from crowd_kernels.reach_glide import (
-    glide,
-    is_elsewhere,
-    place_apex,
-    plan_glide,
-    shortened,
-    still_to_come,
-    take_over,
-)
-from crowd_kernels.reach_goal import (
+from crowd_kernels.reach_glide import plan_glide
+from crowd_kernels.reach_goal import follow_rotation, track_target
+from crowd_kernels.reach_place import pelvis_of
+from crowd_kernels.reach_space import ReachArrays
+from crowd_kernels.reach_state import (
     APEX,
-    END,
+    HOLD,
     NONE,
+    OUT_OF_REACH,
     RETURN,
     ReachLimits,
     ReachState,
-    advance_course,
-    course_shares,
-    follow_rotation,
-    quaternion_of,
-    set_quaternion,
-    set_vector,
-    track_target,
     vector_of,
 )
-from crowd_kernels.reach_missing import spare_missing_place, spare_missing_turn
-from crowd_kernels.reach_space import ReachArrays
-from crowd_kernels.vector import Vector, add, norm, scaled, subtract
+from crowd_kernels.vector import Vector, norm
 
 CHUNKS = 32
-SHARED_TRUNK = 0.25
-"""How much farther hands may be from their goals where both share the trunk, m."""
+SHARED_TIME = 0.2
+"""Further share of its time that a hand takes while the other one shares the trunk."""
 
 
 @inlined_kernel
-def carried_hand(
-    keys: ReachKeys, arm: int, scale: Any, pelvis: Vector, pose: Any, correction: Any
-) -> tuple[Vector, Quaternion]:
-    """Find where a hand would be if only the trunk were corrected, as it was in the last step.
-
-    Parameters
-    ----------
-    keys : ReachKeys
-    arm : int
-    scale : (G,) float32
-        Proportions.
-    pelvis : tuple of float
-        Root frame, m.
-    pose : (256,) float32
-        Pose row, blended.
-    correction : (96,) float32
-        Row of `reach_correction`.
-
-    Returns
-    -------
-    tuple of float, tuple of float
-        Position, m, and rotation of the hand, root frame.
-    """
-    place = pelvis
-    turned = (1.0, 0.0, 0.0, 0.0)
-    for k in range(CHAIN):
-        if k > 0:
-            place = add(place, rotate(turned, bone_of(keys, arm, k, scale)))
-        if keys.chain[0, k] == keys.chain[1, k]:
-            at = keys.chain_place[arm, k]
-            x, y, z = (
-                float(correction[at]),
-                float(correction[CORRECTED + at]),
-                float(correction[2 * CORRECTED + at]),
-            )
-            w = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
-            turned = multiply(turned, (w, x, y, z))
-        turned = multiply(turned, local_rotation(pose, keys.joint[keys.chain[arm, k]], PADDED_JOINTS))
-    return place, normalized(turned)
-
-
-@inlined_kernel
-def share_of_other(character: int, arm: int, risen: float, limits: ReachLimits, state: ReachState) -> float:
-    """Find how much of a shared trunk's correction a hand leaves to the other one.
-
-    All of it at rest, nothing at the apex, where the hand must be at its goal whatever the trunk does.
-    """
-    if state.stage[character, 1 - arm] == NONE:
-        return 0.0
-    _, other = course_shares(state.course[character, 1 - arm], limits.lead)
-    return (1.0 - risen) * other / (risen + other) if other > 0.0 else 0.0
-
-
-@inlined_kernel
-def kept_share(course: float, advance: float, lead: float) -> float:
-    """Find how much of its last correction a hand keeps: on its way back less in each step, at rest nothing.
-
-    Parameters
-    ----------
-    course : float
-    advance : float
-        How far the course went in this step.
-    lead : float
-        See `ReachLimits`.
-    """
-    _, now = course_shares(course, lead)
-    _, before = course_shares(course - advance, lead)
-    return min(now / before, 1.0) if before > 0.0 else 1.0
-
-
-@inlined_kernel
-def aim_hand(
-    character: int,
-    arm: int,
-    other: float,
-    begins: bool,
-    has_passed: bool,
-    scale: Any,
-    live_pelvis: Vector,
-    live_rotation: Quaternion,
-    keys: ReachKeys,
-    limits: ReachLimits,
-    state: ReachState,
-    dt: float,
-    row: Any,
-    pose: Any,
-    pelvis: Any,
-    correction: Any,
-    last: Any,
-    out_task: Any,
-    out_target: Any,
-    out_target_rotation: Any,
-    out_kept: Any,
-) -> None:
-    """Set where inverse kinematics takes one hand: exactly to the goal at the apex.
-
-    The blended motion is moved by a growing share of what it will miss at its apex.
-
-    Parameters
-    ----------
-    other : float
-        Share of the other hand's examples.
-    begins : bool
-        A rotation is asked for from now on.
-    has_passed : bool
-        The course has come to the apex in this step, or left it.
-    scale : (G,) float32
-        Proportions.
-    live_pelvis, live_rotation : tuple of float
-        Pelvis of the pose below this layer, root frame, m.
-    row : (96,) float32
-        Scratch.
-    pose : (256,) float32
-        Pose row, blended.
-    pelvis : (3,) float32
-        Pelvis at leg scale 1, m.
-    correction : (96,) float32
-        Last corrections of the character's joints, see `reach_correction`.
-    last : (256,) float32
-        Last solution of inverse kinematics, see `start_solves`.
-
-    Notes
-    -----
-    All other arguments are those of `reach_character`.
-
-    **Source:** Feng, Xu, Shapiro, section 5.2, the target that varies in time.
-    **Differs from the source:** the share rises along a minimum-jerk curve instead of evenly, so that the
-    hand neither starts nor stops abruptly.
-    """
-    course = state.course[character, arm]
-    side = course if course <= APEX else END - course
-    _, risen = course_shares(course, limits.lead)
-    asked = minimum_jerk(state.rotation_share[character, arm])
-    has_rotation = state.has_rotation[character, arm] or asked > 0.0
-    advance = state.course_rate[character, arm] * dt
-    kept = kept_share(course, advance, limits.lead)
-    out_kept[character, arm] = kept
-    kept *= math.exp(-limits.missing_rate * dt)
-    body, rotation = pelvis_of(keys, scale, pose, pelvis)
-    hand, turned = place_hand(keys, arm, scale, body, rotation, pose, PADDED_JOINTS)
-    point = vector_of(state.point_hand, character, arm)
-    goal = vector_of(state.seen, character, arm)
-    here = add(hand, rotate(turned, point))
-    left = share_of_other(character, arm, risen, limits, state)
-    if left > 0.0:
-        carried, carried_turn = carried_hand(keys, arm, scale, body, pose, correction)
-        carried = add(carried, rotate(carried_turn, point))
-        here = add(here, scaled(subtract(carried, here), left))
-        turned = slerp(turned, carried_turn, left)
-    if begins:
-        _, before = place_hand(keys, arm, scale, body, rotation, last, PADDED_JOINTS)
-        turn_before = rotation_vector(multiply(before, conjugate(turned)))
-        set_vector(state.turn_before, character, arm, turn_before)
-    if 0.0 < asked < 1.0:
-        turn_before = scaled(vector_of(state.turn_before, character, arm), 1.0 - asked)
-        turned = multiply(from_rotation_vector(turn_before), turned)
-    wanted = quaternion_of(state.rotation, character, arm)
-    apex, apex_turned = here, turned
-    is_gliding = state.time_left[character, arm] > 0.0
-    if course != APEX or is_gliding:
-        apex, apex_turned = place_apex(
-            character, arm, state.example_weight, scale, live_pelvis, live_rotation, keys, state, row
+def is_resting(character: int, state: ReachState) -> bool:
+    """Tell whether both hands of a character wait for nothing to come, one of them out of reach."""
+    is_short = False
+    for arm in range(2):
+        moves = (
+            state.stage[character, arm] != HOLD or norm(vector_of(state.seen_velocity, character, arm)) > 0.0
         )
-    if is_gliding:
-        end, end_turned = place_apex(
-            character, arm, state.example_wanted, scale, live_pelvis, live_rotation, keys, state, row
-        )
-        shift, aside = still_to_come(character, arm, apex, end, apex_turned, end_turned, state)
-        goal = subtract(goal, shift)
-        wanted = multiply(wanted, aside)
-        set_quaternion(state.glide_turn, character, arm, aside)
-    # Beyond the blends inverse kinematics would find nothing that looks human.
-    farthest = limits.farthest + SHARED_TRUNK * other
-    nearest = shortened(subtract(goal, here), farthest)
-    offset = nearest
-    late = 1.0
-    out_task[character, arm] = 1
-    if course != APEX:
-        # A trunk that is shared with the other hand does not do what was foreseen.
-        late = minimum_jerk(min(max((side - 0.5) / 0.5, 0.0), 1.0)) * minimum_jerk(min(5.0 * other, 1.0))
-        offset = shortened(subtract(goal, apex), farthest)
-        if late > 0.0:
-            offset = add(offset, scaled(subtract(scaled(nearest, 1.0 / risen), offset), late))
-        turn = rotation_vector(multiply(wanted, conjugate(apex_turned)))
-        state.turn[character, arm] = norm(turn) if has_rotation else 0.0
-        turned = multiply(from_rotation_vector(scaled(turn, risen * asked)), turned)
-    elif not has_rotation:
-        state.turn[character, arm] = 0.0
-    elif state.rotation_share[character, arm] < 1.0:
-        state.turn[character, arm] = norm(rotation_vector(multiply(wanted, conjugate(turned))))
-    if has_passed and not is_gliding and other > 0.0 and is_elsewhere(character, arm, state):
-        offset = take_over(character, arm, nearest, limits, dt, state)
-    else:
-        offset = glide(character, arm, offset, farthest, course <= advance, dt, state)
-    set_vector(state.nearest, character, arm, nearest)
-    target = add(here, scaled(offset, risen))
-    if asked > 0.0:
-        out_task[character, arm] = 3
-        turned = slerp(turned, wanted, late * asked)
-        turned = spare_missing_turn(turned, character, arm, kept, dt, state)
-    target = spare_missing_place(target, character, arm, kept, dt, state)
-    for axis in range(3):
-        out_target[character, arm, axis] = target[axis]
-    for component in range(4):
-        out_target_rotation[character, arm, component] = turned[component]
+        if moves or state.time_left[character, arm] > 0.0:
+            return False
+        is_short = is_short or state.status[character, arm] == OUT_OF_REACH
+    return is_short
 
 
 @inlined_kernel
@@ -290,11 +63,14 @@ def reach_character(
     real: Any,
     rows: Any,
     correction: Any,
+    change: Any,
     last: Any,
     out_task: Any,
     out_target: Any,
     out_target_rotation: Any,
     out_kept: Any,
+    out_bound: Any,
+    out_rests: Any,
 ) -> None:
     """Advance both hands of one character, blend its pose, and set the targets of inverse kinematics.
 
@@ -323,8 +99,8 @@ def reach_character(
         Scratch.
     rows : (SCRATCH_ROW,) float32
         Scratch.
-    correction : (96,) float32
-        Last corrections of the character's joints, see `reach_correction`.
+    correction, change : (96,) float32
+        Last corrections of the character's joints and how they changed, see `reach_correction`.
     last : (256,) float32
         Last solution of inverse kinematics, see `start_solves`.
 
@@ -335,7 +111,6 @@ def reach_character(
     live_pelvis, live_rotation = pelvis_of(keys, scale, pose, pelvis)
     own = (0.0, 0.0)
     begin = (False, False)
-    passed = (False, False)
     for arm in range(2):
         if state.stage[character, arm] == NONE:
             continue
@@ -385,15 +160,14 @@ def reach_character(
         time = state.seconds[character, arm]
         if time <= 0.0:
             time = max(there * math.sqrt(size), limits.time_per_radian * state.turn[character, arm])
-            if shared > 0.0:
-                time += limits.time_shared * norm(vector_of(state.offset, character, arm))
+            far = norm(vector_of(state.offset, character, arm))
+            slower = SHARED_TIME * time + limits.time_shared * far
+            time += state.weight[character, 1 - arm] * slower
         ahead = APEX - course
         if ahead > 0.0 and state.stage[character, arm] != RETURN:
             # On its way there a hand is not at the apex before it has glided to its new target.
             time = max(time, state.time_left[character, arm] / ahead)
         advance_course(character, arm, 1.0 / time, there / (back * time), limits, dt, state)
-        has_passed = (course == APEX) != (state.course[character, arm] == APEX)
-        passed = (has_passed, passed[1]) if arm == 0 else (passed[0], has_passed)
         if state.stage[character, arm] != NONE:
             share, _ = course_shares(state.course[character, arm], limits.lead)
             state.weight[character, arm] = share
@@ -407,7 +181,7 @@ def reach_character(
                 arm,
                 own[1 - arm],
                 begin[arm],
-                passed[arm],
+                walking_share,
                 scale,
                 live_pelvis,
                 live_rotation,
@@ -415,16 +189,19 @@ def reach_character(
                 limits,
                 state,
                 dt,
-                rows[:ROW],
+                rows,
                 pose,
                 pelvis,
                 correction,
+                change,
                 last,
                 out_task,
                 out_target,
                 out_target_rotation,
                 out_kept,
+                out_bound,
             )
+    out_rests[character] = 1 if is_resting(character, state) else 0
 
 
 @parallel_kernel
@@ -445,6 +222,7 @@ def reach_crowd(
     real: Any,
     rows: Any,
     correction: Any,
+    change: Any,
     last_rotation: Any,
     pose_rotation: Any,
     pose_pelvis: Any,
@@ -452,6 +230,8 @@ def reach_crowd(
     out_target: Any,
     out_target_rotation: Any,
     out_kept: Any,
+    out_bound: Any,
+    out_rests: Any,
 ) -> None:
     """Advance the reaches of many characters, blend their poses, and set the targets of inverse kinematics.
 
@@ -485,8 +265,8 @@ def reach_crowd(
         Scratch; 0 from `SCRATCH` on before and after.
     rows : (32, SCRATCH_ROW) float32
         Scratch.
-    correction : (N, 96) float32
-        Last corrections, see `reach_correction`.
+    correction, change : (N, 96) float32
+        Last corrections and how they changed, see `reach_correction`.
     last_rotation : (N, 256) float32
         Last solutions, see `start_solves`.
     pose_rotation : (N, 256) float32
@@ -501,6 +281,11 @@ def reach_crowd(
         Rotations of the hands, root frame.
     out_kept : (N, 2) float32
         Share of the last corrections from which inverse kinematics starts.
+    out_bound : (N, 2) float32
+        How far joints are bound to approach their limits slowly: hardly where a hand begins or ends, as its
+        joints are where the blended motion has them.
+    out_rests : (N,) uint8
+        1 for people whose hands both wait, one of them out of reach.
 
     Notes
     -----
@@ -534,9 +319,12 @@ def reach_crowd(
                 real[chunk],
                 rows[chunk],
                 correction[character],
+                change[character],
                 last_rotation[character],
                 out_task,
                 out_target,
                 out_target_rotation,
                 out_kept,
+                out_bound,
+                out_rests,
             )

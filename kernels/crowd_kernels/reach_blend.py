@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from crowd_kernels._jit import inlined_kernel
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.quaternion import Quaternion, multiply, normalized, rotate, slerp
-from crowd_kernels.reach_goal import APEX, ReachState
+from crowd_kernels.quaternion import Quaternion, slerp
+from crowd_kernels.reach_state import APEX, ReachState
 from crowd_kernels.vector import Vector, add, scaled
 
 JOINTS = 24
@@ -283,39 +283,42 @@ def complete_row(live: Any, rest: Any, row: Any) -> None:
 
 
 @inlined_kernel
-def blend_body(
+def blend_shares(
     character: int,
     walking_share: float,
     keys: ReachKeys,
     own: tuple[float, float],
     state: ReachState,
+    pelvis: Vector,
     rows: Any,
-    pose: Any,
-    pelvis: Any,
-) -> None:
-    """Blend the examples of both hands over the pose of one character.
+) -> Vector:
+    """Blend the examples of both hands, by given shares, over the pose below them.
 
     Where both hands reach, trunk and legs are shared by their weights; each arm belongs to its own reach and
     balances the other one's as far as it is free.
 
     Parameters
     ----------
+    character : int
+    walking_share : float
+        Share of locomotion in the pose.
+    keys : ReachKeys
     own : tuple of float
         Shares of the right and left hand's examples.
+    state : ReachState
+    pelvis : tuple of float
+        Pelvis of the pose below, at leg scale 1, m.
     rows : (SCRATCH_ROW,) float32
-        Scratch.
-    pose : (256,) float32
-        In and out: pose row.
-    pelvis : (3,) float32
-        In and out: pelvis at leg scale 1, m.
+        Scratch. In: compact row of the pose below, from 2 `ROW` on. Out: that of the blended pose, from `ROW`
+        on, and the shares that the pose below keeps in it, from 3 `ROW` on.
 
-    Notes
-    -----
-    All other arguments are those of `reach_character`.
+    Returns
+    -------
+    tuple of float
+        Pelvis at leg scale 1, m.
     """
     row, total, live = rows[:ROW], rows[ROW : 2 * ROW], rows[2 * ROW : 3 * ROW]
     shares = rows[3 * ROW : SCRATCH_ROW]
-    read_joints(keys, pose, live)
     both = 1.0 - (1.0 - own[0]) * (1.0 - own[1])
     total[:] = ZERO
     x = 0.0
@@ -366,76 +369,43 @@ def blend_body(
         shares,
     )
     complete_row(live, shares, total)
-    write_joints(keys, total, shares, pose)
-    pelvis[0] = x + (1.0 - below) * pelvis[0]
-    pelvis[1] = y + (1.0 - below) * pelvis[1]
-    pelvis[2] = z + (1.0 - below) * pelvis[2]
+    return x + (1.0 - below) * pelvis[0], y + (1.0 - below) * pelvis[1], z + (1.0 - below) * pelvis[2]
 
 
 @inlined_kernel
-def local_rotation(row: Any, joint: int, stride: int) -> Quaternion:
-    """Read a joint's rotation from a compact row (stride 24) or a pose row (stride 64)."""
-    return (
-        float(row[joint]),
-        float(row[stride + joint]),
-        float(row[2 * stride + joint]),
-        float(row[3 * stride + joint]),
-    )
-
-
-@inlined_kernel
-def bone_of(keys: ReachKeys, arm: int, k: int, scale: Any) -> Vector:
-    """Find the offset of a joint of a hand's chain from the joint above, in that one's frame, m."""
-    size = float(scale[keys.chain_segment[arm, k]])
-    return (
-        size * keys.chain_offset[arm, k, 0],
-        size * keys.chain_offset[arm, k, 1],
-        size * keys.chain_offset[arm, k, 2],
-    )
-
-
-@inlined_kernel
-def pelvis_of(keys: ReachKeys, scale: Any, pose: Any, pelvis: Any) -> tuple[Vector, Quaternion]:
-    """Read where the pelvis of a pose row is in the character's own size, m, and its rotation; root frame."""
-    leg = float(scale[keys.leg_segment])
-    place = (leg * float(pelvis[0]), leg * float(pelvis[1]), leg * float(pelvis[2]))
-    return place, local_rotation(pose, 0, PADDED_JOINTS)
-
-
-@inlined_kernel
-def place_hand(
-    keys: ReachKeys, arm: int, scale: Any, pelvis: Vector, pelvis_rotation: Quaternion, row: Any, stride: int
-) -> tuple[Vector, Quaternion]:
-    """Walk from the pelvis to a hand.
+def blend_body(
+    character: int,
+    walking_share: float,
+    keys: ReachKeys,
+    own: tuple[float, float],
+    state: ReachState,
+    rows: Any,
+    pose: Any,
+    pelvis: Any,
+) -> None:
+    """Blend the examples of both hands over the pose of one character.
 
     Parameters
     ----------
-    keys : ReachKeys
-    arm : int
-    scale : (G,) float32
-        Proportions.
-    pelvis : tuple of float
-        Root frame, in the character's own size, m.
-    pelvis_rotation : tuple of float
-        Root frame.
-    row : (4 * stride,) float32
-        Local rotations: a compact row (stride 24) or a pose row (stride 64).
-    stride : int
+    own : tuple of float
+        Shares of the right and left hand's examples.
+    rows : (SCRATCH_ROW,) float32
+        Scratch, see `blend_shares`.
+    pose : (256,) float32
+        In and out: pose row.
+    pelvis : (3,) float32
+        In and out: pelvis at leg scale 1, m.
 
-    Returns
-    -------
-    tuple of float, tuple of float
-        Position, m, and rotation of the hand, root frame.
+    Notes
+    -----
+    All other arguments are those of `reach_character`.
     """
-    place = pelvis
-    turned = pelvis_rotation
-    for k in range(1, CHAIN):
-        place = add(place, rotate(turned, bone_of(keys, arm, k, scale)))
-        joint = keys.chain[arm, k]
-        if stride == PADDED_JOINTS:
-            joint = keys.joint[joint]
-        turned = multiply(turned, local_rotation(row, joint, stride))
-    return place, normalized(turned)
+    read_joints(keys, pose, rows[2 * ROW : 3 * ROW])
+    below = (float(pelvis[0]), float(pelvis[1]), float(pelvis[2]))
+    moved = blend_shares(character, walking_share, keys, own, state, below, rows)
+    write_joints(keys, rows[ROW : 2 * ROW], rows[3 * ROW : SCRATCH_ROW], pose)
+    for axis in range(3):
+        pelvis[axis] = moved[axis]
 
 
 @inlined_kernel

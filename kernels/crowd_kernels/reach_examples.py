@@ -3,10 +3,11 @@
 from typing import Any
 
 from crowd_kernels._jit import inlined_kernel
+from crowd_kernels.easing import settle_shares
 from crowd_kernels.quaternion import Quaternion, rotate
 from crowd_kernels.reach_blend import ReachKeys
-from crowd_kernels.reach_goal import ReachLimits, ReachState, set_vector, settle_shares, vector_of
 from crowd_kernels.reach_space import FAR, NEAREST, SCRATCH, ReachArrays, weigh_examples
+from crowd_kernels.reach_state import ReachLimits, ReachState, set_vector, vector_of
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 SLOTS = 72
@@ -324,7 +325,7 @@ def follow_weights(
 
     Notes
     -----
-    **Source:** `reach_goal.settle`, which is linear in place, velocity and acceleration.
+    **Source:** `easing.settle`, which is linear in place, velocity and acceleration.
     """
     time = max(state.time_left[character, arm], limits.example_time)
     own, per_rate, per_bend = settle_shares(time, dt)

@@ -10,27 +10,22 @@ import math
 from typing import Any
 
 from crowd_kernels._jit import inlined_kernel
-from crowd_kernels.easing import minimum_jerk
+from crowd_kernels.easing import hump, minimum_jerk, settle_vector
 from crowd_kernels.quaternion import (
     Quaternion,
     conjugate,
     multiply,
-    rotate,
     rotation_vector,
     slerp,
 )
-from crowd_kernels.reach_blend import JOINTS, ROW, ReachKeys, blend_apex, place_hand, unit_row
-from crowd_kernels.reach_goal import (
-    APEX,
-    HOLD,
-    MOVE,
+from crowd_kernels.reach_blend import JOINTS, ROW, ReachKeys, blend_apex, unit_row
+from crowd_kernels.reach_place import place_apex, place_point
+from crowd_kernels.reach_state import (
     ReachLimits,
     ReachState,
-    hump,
     quaternion_of,
     set_quaternion,
     set_vector,
-    settle,
     vector_of,
 )
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
@@ -39,8 +34,6 @@ PEAK = 5.7735
 """Largest acceleration of minimum-jerk motion, over its way and its time squared."""
 TURNING_ROUND = 0.7
 """Further time for a hand that glides already, over that since its glide began or until it ends."""
-FORESEEN = 0.002
-"""Less than this beside what was foreseen nobody sees, m."""
 SPARED = 0.65
 """What hopeless ways are shorter by than the longest that there is, over `longest`, see `shortened`."""
 
@@ -121,10 +114,11 @@ def bulge_now(character: int, arm: int, state: ReachState) -> tuple[Vector, Vect
 
 
 @inlined_kernel
-def place_apex(
+def goal_now(
     character: int,
     arm: int,
-    weights: Any,
+    apex: Vector,
+    apex_turned: Quaternion,
     scale: Any,
     live_pelvis: Vector,
     live_rotation: Quaternion,
@@ -132,51 +126,44 @@ def place_apex(
     state: ReachState,
     row: Any,
 ) -> tuple[Vector, Quaternion]:
-    """Find where the point of a hand is, and how the hand is turned, where its blend is at the apex.
+    """Find the goal of one hand, and its rotation, less what the examples will still do while it glides.
 
-    Notes
-    -----
-    Arguments are those of `blend_apex`; root frame, m.
-    """
-    body, body_turned = blend_apex(
-        character, arm, weights, scale, live_pelvis, live_rotation, keys, state, row
-    )
-    hand, turned = place_hand(keys, arm, scale, body, body_turned, row, JOINTS)
-    return add(hand, rotate(turned, vector_of(state.point_hand, character, arm))), turned
-
-
-@inlined_kernel
-def still_to_come(
-    character: int,
-    arm: int,
-    apex: Vector,
-    end: Vector,
-    apex_turned: Quaternion,
-    end_turned: Quaternion,
-    state: ReachState,
-) -> tuple[Vector, Quaternion]:
-    """Find how far the examples will still take a gliding hand: from the blend of now to the wanted one.
-
-    Towards the end less and less is left to them, as they follow targets that move with a delay.
+    The blend of now goes on to the wanted one. Towards the end less and less is left to that, as examples
+    follow targets that move with a delay.
 
     Parameters
     ----------
     character, arm : int
-    apex, end : tuple of float
-        Point of the hand in both blends, root frame, m.
-    apex_turned, end_turned : tuple of float
-        Rotations of the hand in both.
+    apex : tuple of float
+        Point of the hand where its blend is at the apex, root frame, m.
+    apex_turned : tuple of float
+        Rotation of the hand there.
     state : ReachState
+        In and out: `glide_turn`.
+    row : (96,) float32
+        Scratch.
 
     Returns
     -------
     tuple of float, tuple of float
-        Way, m, and how the hand is turned now against the wanted blend, in the frame of the latter.
+        Root frame, m.
+
+    Notes
+    -----
+    All other arguments are those of `plan_glide`.
     """
+    goal = vector_of(state.seen, character, arm)
+    wanted = quaternion_of(state.rotation, character, arm)
+    if state.time_left[character, arm] <= 0.0:
+        return goal, wanted
+    end, end_turned = place_apex(
+        character, arm, state.example_wanted, scale, live_pelvis, live_rotation, keys, state, row
+    )
     progress = 1.0 - state.time_left[character, arm] / state.plan_time[character, arm]
     ending = minimum_jerk(min(max(2.0 * progress - 1.0, 0.0), 1.0))
-    aside = multiply(conjugate(end_turned), apex_turned)
-    return scaled(subtract(end, apex), 1.0 - ending), slerp(aside, (1.0, 0.0, 0.0, 0.0), ending)
+    aside = slerp(multiply(conjugate(end_turned), apex_turned), (1.0, 0.0, 0.0, 0.0), ending)
+    set_quaternion(state.glide_turn, character, arm, aside)
+    return subtract(goal, scaled(subtract(end, apex), 1.0 - ending)), multiply(wanted, aside)
 
 
 @inlined_kernel
@@ -224,20 +211,15 @@ def plan_glide(
     **Source:** the acceleration of minimum-jerk motion; Flash, Hogan, 1985.
     """
     now, then = rows[:ROW], rows[ROW : 2 * ROW]
-    point = vector_of(state.point_hand, character, arm)
     body, body_turned = blend_apex(
         character, arm, state.example_weight, scale, live_pelvis, live_rotation, keys, state, now
     )
     end_body, end_body_turned = blend_apex(
         character, arm, state.example_wanted, scale, live_pelvis, live_rotation, keys, state, then
     )
-    hand, turned = place_hand(keys, arm, scale, body, body_turned, now, JOINTS)
-    end_hand, end_turned = place_hand(keys, arm, scale, end_body, end_body_turned, then, JOINTS)
-    here = add(hand, rotate(turned, point))
-    end = add(end_hand, rotate(end_turned, point))
+    here, turned = place_point(character, arm, scale, body, body_turned, keys, state, now, JOINTS)
+    end, end_turned = place_point(character, arm, scale, end_body, end_body_turned, keys, state, then, JOINTS)
     turn = largest_turn(now, then)
-    # What is wished for hardly moves at the beginning of a glide: the blend comes nearer as it should.
-    set_vector(state.lag_velocity, character, arm, vector_of(state.offset_velocity, character, arm))
     offset = vector_of(state.offset, character, arm)
     _, bend = bulge_now(character, arm, state)
     acceleration = add(vector_of(state.lag_acceleration, character, arm), bend)
@@ -270,70 +252,31 @@ def plan_glide(
     for lane in range(ROW):
         now[lane] += then[lane]
     unit_row(now)
-    middle, middle_turned = place_hand(
-        keys,
+    middle, _ = place_point(
+        character,
         arm,
         scale,
         scaled(add(body, end_body), 0.5),
         slerp(body_turned, end_body_turned, 0.5),
+        keys,
+        state,
         now,
         JOINTS,
     )
-    middle = add(middle, rotate(middle_turned, point))
     middle = add(middle, scaled(add(offset, wish), 0.5))
     set_vector(state.bulge, character, arm, away_from_body(middle, begin, end, limits))
 
 
 @inlined_kernel
-def is_elsewhere(character: int, arm: int, state: ReachState) -> bool:
-    """Tell whether a hand was beside its goal in the last step, as the other one moved the trunk."""
-    away = subtract(vector_of(state.nearest, character, arm), vector_of(state.offset, character, arm))
-    return norm(away) > FORESEEN
-
-
-@inlined_kernel
-def take_over(
-    character: int, arm: int, nearest: Vector, limits: ReachLimits, dt: float, state: ReachState
-) -> Vector:
-    """Let a hand begin to glide that has come to its apex, or leaves it, beside what was foreseen.
-
-    The trunk that both hands share is elsewhere where the other hand has come, or gone, late on the way.
-
-    Parameters
-    ----------
-    character, arm : int
-    nearest : tuple of float
-        Offset that brings the hand to its goal, m.
-    limits : ReachLimits
-    dt : float
-        s.
-    state : ReachState
-        In and out: `offset`, the glide, `stage`.
-
-    Returns
-    -------
-    tuple of float
-        Offset in this step, in which the hand goes on as before, m.
-    """
-    rate = vector_of(state.offset_velocity, character, arm)
-    speed = (0.0, 0.0, 0.0)
-    if state.course[character, arm] == APEX:
-        speed = scaled(subtract(nearest, vector_of(state.nearest, character, arm)), 1.0 / dt)
-    set_vector(state.lag_velocity, character, arm, subtract(rate, speed))
-    set_vector(state.lag_acceleration, character, arm, (0.0, 0.0, 0.0))
-    set_vector(state.bulge, character, arm, (0.0, 0.0, 0.0))
-    state.time_left[character, arm] = limits.least_time
-    state.plan_time[character, arm] = limits.least_time
-    if state.stage[character, arm] == HOLD:
-        state.stage[character, arm] = MOVE
-    offset = add(vector_of(state.offset, character, arm), scaled(rate, dt))
-    set_vector(state.offset, character, arm, offset)
-    return offset
-
-
-@inlined_kernel
 def glide(
-    character: int, arm: int, wish: Vector, farthest: float, is_first: bool, dt: float, state: ReachState
+    character: int,
+    arm: int,
+    wish: Vector,
+    step: Vector,
+    farthest: float,
+    is_first: bool,
+    dt: float,
+    state: ReachState,
 ) -> Vector:
     """Advance the offset of one hand: what is wished for, and what is left of its glide there.
 
@@ -342,6 +285,8 @@ def glide(
     character, arm : int
     wish : tuple of float
         Offset of a hand that does not glide, m.
+    step : tuple of float
+        How it has moved in this step, m.
     farthest : float
         Farthest that inverse kinematics takes a hand, m. A hand that is sent back from a fast glide swings
         on, but not farther than that.
@@ -362,24 +307,25 @@ def glide(
     left = state.time_left[character, arm]
     if left > 0.0:
         if left == state.plan_time[character, arm]:
-            # The glide begins now, where the hand is.
-            set_vector(state.lag, character, arm, subtract(before, wish))
-        for axis in range(3):
-            place, velocity, acceleration = settle(
-                state.lag[character, arm, axis],
-                state.lag_velocity[character, arm, axis],
-                state.lag_acceleration[character, arm, axis],
-                left,
-                dt,
-            )
-            state.lag[character, arm, axis] = place
-            state.lag_velocity[character, arm, axis] = velocity
-            state.lag_acceleration[character, arm, axis] = acceleration
+            # The glide begins now, where the hand was, as fast as it was.
+            set_vector(state.lag, character, arm, add(subtract(before, wish), step))
+            speed = subtract(vector_of(state.offset_velocity, character, arm), scaled(step, 1.0 / dt))
+            set_vector(state.lag_velocity, character, arm, speed)
+        lag, velocity, acceleration = settle_vector(
+            vector_of(state.lag, character, arm),
+            vector_of(state.lag_velocity, character, arm),
+            vector_of(state.lag_acceleration, character, arm),
+            left,
+            dt,
+        )
+        set_vector(state.lag, character, arm, lag)
+        set_vector(state.lag_velocity, character, arm, velocity)
+        set_vector(state.lag_acceleration, character, arm, acceleration)
         state.time_left[character, arm] = left - dt if left > dt else 0.0
         if left <= dt:
             set_quaternion(state.glide_turn, character, arm, (1.0, 0.0, 0.0, 0.0))
         bulge, _ = bulge_now(character, arm, state)
-        offset = add(wish, add(vector_of(state.lag, character, arm), bulge))
+        offset = add(wish, add(lag, bulge))
     set_vector(state.offset, character, arm, offset)
     rate = 0.0 if is_first else 1.0 / dt
     set_vector(state.offset_velocity, character, arm, scaled(subtract(offset, before), rate))

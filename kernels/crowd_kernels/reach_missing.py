@@ -16,11 +16,11 @@ from crowd_kernels.quaternion import (
     conjugate,
     from_rotation_vector,
     multiply,
-    rotate,
     rotation_vector,
 )
-from crowd_kernels.reach_blend import ReachKeys, pelvis_of, place_hand
-from crowd_kernels.reach_goal import ReachState, quaternion_of, set_vector, vector_of
+from crowd_kernels.reach_blend import ReachKeys
+from crowd_kernels.reach_place import pelvis_of, place_point
+from crowd_kernels.reach_state import ReachState, quaternion_of, set_vector, vector_of
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
 CHUNKS = 32
@@ -108,16 +108,15 @@ def find_missing(
     pose: Any,
     pelvis: Any,
     state: ReachState,
-) -> float:
-    """Find what is missing of what one hand was asked for; returns the angle, rad.
+) -> tuple[float, float]:
+    """Find what is missing of what one hand was asked for; returns distance, m, and angle, rad.
 
     Notes
     -----
     Arguments are those of `find_missing_crowd`, for one character.
     """
     body, rotation = pelvis_of(keys, scale, pose, pelvis)
-    hand, turned = place_hand(keys, arm, scale, body, rotation, pose, PADDED_JOINTS)
-    tip = add(hand, rotate(turned, vector_of(state.point_hand, character, arm)))
+    tip, turned = place_point(character, arm, scale, body, rotation, keys, state, pose, PADDED_JOINTS)
     away = subtract(vector_of(target, character, arm), tip)
     set_vector(state.missing_place, character, arm, add(vector_of(state.missing_place, character, arm), away))
     missing = (0.0, 0.0, 0.0)
@@ -126,7 +125,7 @@ def find_missing(
         wanted = multiply(spared, quaternion_of(target_rotation, character, arm))
         missing = rotation_vector(multiply(wanted, conjugate(turned)))
     set_vector(state.missing_turn, character, arm, missing)
-    return norm(missing)
+    return norm(away), norm(missing)
 
 
 @parallel_kernel
@@ -139,8 +138,8 @@ def find_missing_crowd(
     active: Any,
     pose_rotation: Any,
     pose_pelvis: Any,
-    distance: Any,
     state: ReachState,
+    out_distance: Any,
     out_angle: Any,
 ) -> None:
     """Find what is missing of what hands were asked for, after inverse kinematics.
@@ -162,10 +161,10 @@ def find_missing_crowd(
         Pose rows.
     pose_pelvis : (N, 3) float32
         Pelvis in the root frame at leg scale 1, m.
-    distance : (N, 2) float32
-        How far the hands are from `target`, m.
     state : ReachState
         In and out: `missing_place` and `missing_turn`, what was spared and what is missing.
+    out_distance : (N, 2) float32
+        In and out: how far the hands are from `target`, m; found anew where they are not very close.
     out_angle : (N, 2) float32
         Angle to the rotation wanted, rad; 0 where none is.
 
@@ -184,8 +183,8 @@ def find_missing_crowd(
                 if asked == NOTHING:
                     set_vector(state.missing_place, character, arm, (0.0, 0.0, 0.0))
                     set_vector(state.missing_turn, character, arm, (0.0, 0.0, 0.0))
-                elif asked == BOTH or distance[character, arm] > EXACT:
-                    angle = find_missing(
+                elif asked == BOTH or out_distance[character, arm] > EXACT:
+                    out_distance[character, arm], angle = find_missing(
                         character,
                         arm,
                         keys,

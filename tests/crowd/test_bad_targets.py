@@ -12,7 +12,7 @@ from crowd.motion.swing_twist import FINGERS, swing_twist_limits
 from crowd.scenario.load import scenario_from
 from crowd.scenario.source import ScenarioSource
 from crowd.tasks import EventKind
-from crowd_kernels import gaze, reach_goal
+from crowd_kernels import gaze, reach_state
 
 NAN = float("nan")
 INSIDE = (0.0, 1.2, 0.02)
@@ -108,19 +108,19 @@ def test_bad_reaches_are_refused_from_rest_and_on_the_way(dt, target, rotation, 
     commands.reach(0, target, "right", rotation_world=rotation)
     before = hand_place(simulation)
     watch(simulation, 1.0, poses=poses)
-    assert state.reach_status[0, 0] == reach_goal.REFUSED
+    assert state.reach_status[0, 0] == reach_state.REFUSED
     assert told(simulation) == [("target_refused", 0, "reach", detail)]
     assert np.linalg.norm(hand_place(simulation) - before) < 0.02
     commands.reach(0, BEFORE, "right")
     watch(simulation, 0.4, poses=poses)
     commands.reach(0, target, "right", rotation_world=rotation)
     watch(simulation, 1.5, poses=poses)
-    assert state.reach_status[0, 0] == reach_goal.REFUSED
+    assert state.reach_status[0, 0] == reach_state.REFUSED
     assert told(simulation)[1:] == [("target_refused", 0, "reach", detail)]
     assert np.linalg.norm(hand_place(simulation) - BEFORE) < 0.15
     commands.end_reach(0)
     watch(simulation, 2.0, poses=poses)
-    assert (state.reach_stage[0] == reach_goal.NONE).all()
+    assert (state.reach_stage[0] == reach_state.NONE).all()
     _, acceleration = angular_motion(np.array(poses, float), dt)
     assert acceleration < LARGEST_RATIO * EXAMPLE_ACCELERATION
     attempted = simulation.metrics.as_dict()["reach.attempted"]
@@ -158,12 +158,12 @@ def test_what_is_asked_stays_in_the_state_and_free_targets_are_taken_up(dt):
     watch(simulation, 0.4)
     state.reach_target_world[0, 0] = BEHIND
     watch(simulation, 1.5)
-    assert state.reach_status[0, 0] == reach_goal.REFUSED
+    assert state.reach_status[0, 0] == reach_state.REFUSED
     assert told(simulation)[1:] == [("target_refused", 0, "reach", "a wall is in the way")]
     assert hand_place(simulation)[2] < 0.45
     state.reach_target_world[0, 0] = BEFORE
     watch(simulation, 1.5)
-    assert state.reach_status[0, 0] == reach_goal.REACHED
+    assert state.reach_status[0, 0] == reach_state.REACHED
     assert len(told(simulation)) == 2
 
 
@@ -175,7 +175,7 @@ def test_a_hand_that_is_refused_on_its_way_returns_after_its_time(dt, target):
     watch(simulation, 0.4)
     simulation.commands.reach(0, target, "right", hold=0.5)
     watch(simulation, 4.0)
-    assert (simulation.state.reach_stage[0] == reach_goal.NONE).all()
+    assert (simulation.state.reach_stage[0] == reach_state.NONE).all()
 
 
 @both_rates
@@ -248,7 +248,7 @@ def test_what_is_touched_is_followed_until_somebody_else_has_it(dt):
     simulation.objects.holder[0], simulation.objects.holder_hand[0] = 1, (True, False)
     watch(simulation, 2.0)
     assert state.grab_status[0, 0] == GrabStatus.TAKEN
-    assert (state.reach_stage[0] == reach_goal.NONE).all()
+    assert (state.reach_stage[0] == reach_state.NONE).all()
     assert told(simulation) == [("target_refused", 0, "grab", "somebody else holds the object")]
 
 
@@ -272,7 +272,7 @@ def test_what_is_held_is_not_put_where_it_cannot_go(dt, place, detail):
     watch(simulation, 2.5)
     simulation.commands.put(0, place)
     watch(simulation, 1.5)
-    assert simulation.state.reach_status[0, 0] == reach_goal.REFUSED
+    assert simulation.state.reach_status[0, 0] == reach_state.REFUSED
     assert told(simulation) == [("target_refused", 0, "reach", detail)]
     assert simulation.objects.holder[0] == 0
     assert simulation.objects.position_world[0, 2] < 0.5

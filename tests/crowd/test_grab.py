@@ -10,7 +10,7 @@ from crowd.motion.rotation import conjugate, multiply, rotate
 from crowd.scenario.load import scenario_from
 from crowd.scenario.source import ScenarioSource
 from crowd.simulation import Simulation
-from crowd_kernels import _jit, reach_goal
+from crowd_kernels import _jit, reach_state
 
 BALL, ROD, CARTON, GONE = range(4)
 OBJECTS = [
@@ -172,10 +172,10 @@ def test_from_one_hand_to_the_other(run: Simulation) -> None:
     state, objects = run.state, run.objects
     run.commands.end_reach(0)
     advance(run, 1.5)
-    assert (state.reach_stage[0] == reach_goal.NONE).all(), "the left hand hangs at the side"
+    assert (state.reach_stage[0] == reach_state.NONE).all(), "the left hand hangs at the side"
     run.grab.grasp(state, rows(0), 0, BALL)
     assert state.grab_status[0, 0] == GrabStatus.APPROACHING
-    assert state.reach_stage[0].tolist() == [reach_goal.NONE, reach_goal.MOVE], (
+    assert state.reach_stage[0].tolist() == [reach_state.NONE, reach_state.MOVE], (
         "the left hand brings the ball before the body first"
     )
     advance(run, 3.5)

@@ -12,7 +12,7 @@ from crowd.motion.rotation import conjugate, rotate
 from crowd.scenario.load import scenario_from
 from crowd.scenario.source import ScenarioSource
 from crowd.simulation import Simulation
-from crowd_kernels.reach_goal import MOVING, NONE, OUT_OF_REACH, REACHED, REFUSED
+from crowd_kernels.reach_state import MOVING, NONE, OUT_OF_REACH, REACHED, REFUSED
 
 THINGS = [
     {"name": "ball", "shape": "sphere", "radius": 0.04, "position": [-0.25, 1.0, 0.45]},

@@ -22,7 +22,7 @@ from crowd.motion.importing.folder import Request, import_motions
 from crowd.motion.importing.importer import import_clip
 from crowd.motion.importing.labels import write_labels
 from crowd.motion.library_file import load_library, save_library
-from crowd_kernels.reach_goal import REACHED
+from crowd_kernels.reach_state import REACHED
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 SMARTBODY = DATA / "smartbody"

@@ -7,15 +7,17 @@ from crowd.bench.reach import (
     FASTEST,
     LARGEST_JITTER,
     LARGEST_RATIO,
+    LEAST_MET,
     TOLERANCE,
     TURNING,
     TWIST,
     run_batch,
+    run_both,
     send_on,
 )
-from crowd.bench.reachers import JointMotion, Reachers, angular_motion, random_targets, random_turns
-from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate
-from crowd_kernels.reach_goal import HOLD, MOVING, OUT_OF_REACH, REACHED
+from crowd.bench.reachers import Reachers, angular_motion, random_targets, random_turns
+from crowd.motion.rotation import conjugate, from_vector, multiply
+from crowd_kernels.reach_state import HOLD, MOVING, OUT_OF_REACH, REACHED
 
 PEOPLE = 60
 
@@ -155,29 +157,40 @@ def test_a_second_hand_keeps_the_time_that_is_asked(reachers, rng):
 
 
 @pytest.mark.parametrize("hand", [0, 1])
-def test_targets_may_move_and_turn_while_hands_glide_to_them(hand, rng):
-    reachers = Reachers(100, seed=4)
-    state = reachers.simulation.state
+def test_targets_may_move_and_turn_and_jump_at_any_time(hand, rng):
+    reachers = Reachers(200, seed=4)
     for _ in range(3):
         reachers.step()
     ends = [
         run_batch(reachers, hand, random_targets(reachers, hand, rng, is_far=False), None) for _ in range(2)
     ]
-    way, turning = 0.15 * random_turns(100, rng), 0.3 * random_turns(100, rng)
-    motion = JointMotion(reachers.simulation.dt)
-    for frame in range(360):
-        end = ends[frame // 120 % 2]
-        swing = np.sin(2 * np.pi * frame / 90) * 90 / (2 * np.pi) / 60
-        target, rotation = end.target + way * swing, multiply(from_vector(turning * swing), end.rotation)
-        if frame % 120 == 0:
-            reachers.reach(hand, target, rotation)
-        facing = about(1, state.yaw)
-        state.reach_target_world[:, hand] = rotate(facing, target) + state.position_world
-        state.reach_target_rotation_world[:, hand] = multiply(facing, rotation)
+    way = [ends[time % 2] for time in range(5)]
+    targets, rotations = [end.target for end in way], [end.rotation for end in way]
+    outcome = send_on(reachers, hand, targets, rotations, rng, moves=True)
+    assert (outcome.status == REACHED).all()
+    assert np.linalg.norm(outcome.place - targets[-1], axis=1).max() < TOLERANCE
+    assert outcome.acceleration < allowed(reachers)
+    assert outcome.speed < FASTEST
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.parametrize("times", [1, 2])
+def test_both_hands_go_anywhere_at_any_time_and_nothing_jumps(seed, times, rng):
+    """Also where nobody has both at once: one trunk bears both, and straight arms come into reach again."""
+    reachers = Reachers(300, seed)
+    for _ in range(3):
         reachers.step()
-        motion.add(reachers.local_rotations())
-    assert np.median(np.linalg.norm(reachers.hand(hand)[0] - target, axis=1)) < 1e-3
-    assert motion.acceleration < allowed(reachers)
+    outcomes = run_both(reachers, rng, times)
+    met = np.mean([(outcome.status == REACHED).mean() for outcome in outcomes])
+    assert met > LEAST_MET
+    for outcome in outcomes:
+        assert np.isin(outcome.status, (REACHED, OUT_OF_REACH)).all()
+        away = np.linalg.norm(outcome.place - outcome.target, axis=1)
+        assert away[outcome.status == REACHED].max() < TOLERANCE
+        assert outcome.acceleration < allowed(reachers)
+        assert outcome.speed < FASTEST
+        assert outcome.jitter < LARGEST_JITTER
+    assert not reachers.simulation.state.reach_stage.any(), "hands have returned"
 
 
 @pytest.mark.parametrize("hand", [0, 1])

@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 from crowd.bench.reachers import Reachers
 from crowd.controllers.reach import REACH_LIMITS
 from crowd.motion.rotation import multiply
-from crowd_kernels.reach import carried_hand, reach_crowd
+from crowd_kernels.easing import hump, settle
+from crowd_kernels.reach import reach_crowd
+from crowd_kernels.reach_aim import carried_hand
 from crowd_kernels.reach_correction import LANES as CORRECTED
-from crowd_kernels.reach_goal import (
+from crowd_kernels.reach_goal import is_inside_body
+from crowd_kernels.reach_state import (
     HOLD,
     MOVE,
     MOVING,
@@ -22,11 +25,8 @@ from crowd_kernels.reach_goal import (
     REFUSED,
     RETURN,
     ReachState,
-    hump,
-    is_inside_body,
-    reach_status_crowd,
-    settle,
 )
+from crowd_kernels.reach_status import reach_status_crowd
 from tests.oracles import reach as oracle
 from tests.oracles import reach_space as space_oracle
 
@@ -100,8 +100,10 @@ def test_reach_matches_oracle(reachers, hand, course, rng):
         space.arrays, keys, REACH_LIMITS, simulation.model.people.segment_scale, reachers.size,
         state.position_world, state.yaw, state.is_seated, np.zeros(24), reachers.rows, 1e-5,
         ReachState(*(getattr(state, f"reach_{name}") for name in ReachState._fields)),
-        reach._number, reach._real, reach._rows, state.reach_correction, state.reach_last_rotation,
-        pose, pelvis, task, out, np.zeros((24, 2, 4), np.float32), np.zeros((24, 2), np.float32),
+        reach._number, reach._real, reach._rows, state.reach_correction,
+        state.reach_correction_change, state.reach_last_rotation,
+        pose, pelvis, task, out, np.zeros((24, 2, 4), np.float32), *np.zeros((2, 24, 2), np.float32),
+        np.zeros(24, np.uint8),
     )  # fmt: skip
     first = [0, len(space.examples[0].clips)][hand]
     for row in range(24):
@@ -130,13 +132,14 @@ def test_a_carried_hand_hangs_on_the_corrected_trunk(reachers, arm, rng):
     np.testing.assert_array_equal(tree.joint[keys.chain_place], keys.joint[keys.chain])
     pose = simulation.state.pose_rotation[0].copy()
     correction = rng.uniform(-0.2, 0.2, 3 * CORRECTED).astype(np.float32)
+    change = rng.uniform(-0.02, 0.02, 3 * CORRECTED).astype(np.float32)
     local = pose.reshape(4, 64)[:, keys.joint].T.astype(float)
     for compact in set(keys.chain[0]) & set(keys.chain[1]):
         at = np.flatnonzero(tree.joint == keys.joint[compact])[0]
-        x, y, z = correction[at::CORRECTED].astype(float)
+        x, y, z = (correction + change)[at::CORRECTED].astype(float)
         local[compact] = multiply([np.sqrt(1 - x * x - y * y - z * z), x, y, z], local[compact])
     scale = simulation.model.people.segment_scale[0]
-    place, turned = carried_hand(keys, arm, scale, (0.1, 0.9, 0.0), pose, correction)
+    place, turned = carried_hand(keys, arm, scale, (0.1, 0.9, 0.0), pose, correction, change)
     wanted, frame = oracle.place_hand(keys, arm, scale.astype(float), (0.1, 0.9, 0.0), local)
     np.testing.assert_allclose(place, wanted, atol=1e-6)
     np.testing.assert_allclose(abs(np.dot(turned, frame)), 1.0, atol=1e-6)

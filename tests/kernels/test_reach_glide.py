@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 
 from crowd.controllers.reach import REACH_LIMITS
 from crowd_kernels.reach_blend import JOINTS
+from crowd_kernels.reach_course import paced
 from crowd_kernels.reach_examples import LEAST_WEIGHT, SLOTS, follow_weights
 from crowd_kernels.reach_glide import away_from_body, glide, largest_turn, shortened
-from crowd_kernels.reach_goal import ReachState, paced
+from crowd_kernels.reach_state import ReachState
 from tests.oracles import reach as oracle
 
 DT = 1 / 60
+STILL = (0.0, 0.0, 0.0)
 length = st.floats(0.0, 1.5)
 metre = st.floats(-0.4, 0.4)
 
@@ -85,11 +87,11 @@ def test_a_glide_goes_on_from_where_the_hand_is_and_ends_in_time_at_what_is_wish
 ):
     wish, time = (0.05, -0.02, 0.01), steps * DT
     state = state_of(
-        offset=offset, lag_velocity=velocity, time_left=time, plan_time=time, bulge=(0.0, 0.0, 0.05)
+        offset=offset, offset_velocity=velocity, time_left=time, plan_time=time, bulge=(0.0, 0.0, 0.05)
     )
     places = [offset]
     for _ in range(steps + 1):
-        places.append(glide(0, 0, wish, 2.0, False, DT, state))
+        places.append(glide(0, 0, wish, STILL, 2.0, False, DT, state))
     assert places[-1] == wish
     assert state.time_left[0, 0] == 0.0
     first = np.subtract(places[1], places[0]) / DT
@@ -98,11 +100,32 @@ def test_a_glide_goes_on_from_where_the_hand_is_and_ends_in_time_at_what_is_wish
     assert np.abs(first - velocity).max() < DT * (60.0 * largest / time + 40.0 * 0.4) / time
 
 
+@given(
+    offset=st.tuples(metre, metre, metre),
+    velocity=st.tuples(metre, metre, metre),
+    speed=st.tuples(metre, metre, metre),
+)
+def test_a_glide_to_what_moves_begins_as_fast_as_the_hand_was(offset, velocity, speed):
+    """As where the other hand moves the trunk, against which the offset moves, while a target jumps."""
+    time, wish = 1.5, np.array([0.05, -0.02, 0.01])
+    state = state_of(offset=offset, offset_velocity=velocity, time_left=time, plan_time=time)
+    places = [np.array(offset)]
+    step = tuple(np.multiply(speed, DT))
+    for frame in range(4):
+        moved = tuple(wish + np.multiply(speed, frame * DT))
+        places.append(np.array(glide(0, 0, moved, step, 2.0, False, DT, state)))
+    velocities = np.diff(places, axis=0) / DT
+    # Least jerk over so long a time hardly changes a velocity in a step, but a jump would.
+    before = np.vstack([velocity, velocities[:-1]])
+    assert np.abs(velocities - before).max() < 0.12
+    assert np.abs(state.offset_velocity[0, 0] - velocities[-1]).max() < 1e-9
+
+
 def test_a_hand_that_does_not_glide_is_where_it_is_wished_and_its_velocity_is_noted():
     state = state_of(offset=(0.1, 0.0, 0.0))
-    assert glide(0, 0, (0.1, 0.02, 0.0), 2.0, False, DT, state) == (0.1, 0.02, 0.0)
+    assert glide(0, 0, (0.1, 0.02, 0.0), STILL, 2.0, False, DT, state) == (0.1, 0.02, 0.0)
     np.testing.assert_allclose(state.offset_velocity[0, 0], (0.0, 0.02 / DT, 0.0))
-    glide(0, 0, (0.5, 0.0, 0.0), 2.0, True, DT, state)
+    glide(0, 0, (0.5, 0.0, 0.0), STILL, 2.0, True, DT, state)
     assert not state.offset_velocity.any(), "a reach that begins comes from nowhere"
 
 

@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 from crowd.controllers.reach import built_in_reach_space
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.reach_goal import ReachState
 from crowd_kernels.reach_missing import (
     BOTH,
     SLIGHT,
@@ -15,6 +14,7 @@ from crowd_kernels.reach_missing import (
     spare_missing_place,
     spare_missing_turn,
 )
+from crowd_kernels.reach_state import ReachState
 from tests.oracles import reach as oracle
 
 KEYS = built_in_reach_space().keys
@@ -70,10 +70,12 @@ def test_what_is_missing_is_what_was_wanted_against_what_came(rng, state, poses)
     task[3, 0], task[4], distance[4, 1] = 0, 1, 0.0
     active = np.array([4, 1, 3, 0], np.int32)
     before = state.missing_place.copy(), state.missing_turn.copy()
+    # Corrections that turn otherwise than solved say so by a distance that no hand has.
+    distance[1] = 1e3
     angle = np.full((COUNT, 2), np.nan, np.float32)
     find_missing_crowd(
         KEYS, np.tile(SCALE, (COUNT, 1)), task, (place + away).astype(np.float32), asked.astype(np.float32),
-        active, poses, pelvis, distance, state, angle,
+        active, poses, pelvis, state, distance, angle,
     )  # fmt: skip
     places, turns = before[0] + away, turn.as_rotvec().reshape(COUNT, 2, 3)
     places[2], turns[2] = before[0][2], before[1][2]
@@ -82,6 +84,7 @@ def test_what_is_missing_is_what_was_wanted_against_what_came(rng, state, poses)
     places[4, 1], turns[4, 1] = before[0][4, 1], before[1][4, 1]
     np.testing.assert_allclose(state.missing_place, places, atol=2e-6)
     np.testing.assert_allclose(state.missing_turn, turns, atol=1e-5)
+    np.testing.assert_allclose(distance[1], np.linalg.norm(away[1], axis=1), atol=1e-5)
     turns[4] = 0
     np.testing.assert_allclose(angle[active], np.linalg.norm(turns[active], axis=2), atol=1e-5)
     assert np.isnan(angle[2]).all()
