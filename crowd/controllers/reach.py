@@ -87,7 +87,7 @@ class ReachSettings:
     """Rate with which turns of joints fade that the targets do not ask for, 1/s. Where it is larger, hands
     stop short of rotations far from the blended ones, since damped steps make up for less than fades."""
     correction_acceleration: float = 40.0
-    """Largest angular acceleration of what inverse kinematics turns joints, rad/s^2."""
+    """Largest angular acceleration of what inverse kinematics turns joints, rad/s^2; limits come first."""
     least_speed: float = 0.06
     """Where both hands wait that cannot both be where they should, joints turn faster than this or rest,
     rad/s."""
@@ -185,6 +185,8 @@ class Reach:
         """Start people with hanging arms."""
         state.reach_stage[characters] = NONE
         state.reach_status[characters] = NONE
+        state.reach_course[characters] = 0.0
+        state.reach_weight[characters] = 0.0
         state.reach_correction[characters] = 0.0
         state.reach_correction_change[characters] = 0.0
         state.reach_last_rotation[characters] = 0.0
@@ -261,9 +263,8 @@ class Reach:
             "lag_acceleration",
             "turn_velocity",
             "turn_acceleration",
-        ):
-            getattr(state, f"reach_{name}")[rows, own] = 0.0
-        for name in (
+            "missing_place",
+            "missing_turn",
             "course",
             "course_rate",
             "time_left",
@@ -376,7 +377,7 @@ class Reach:
         )
         self.part_seconds["blending"] += blended - begin
         self.part_seconds["inverse kinematics"] += time.perf_counter() - blended
-        self._report(state, reaching, step.dt, parts)
+        self._report(reaching, step.dt, parts)
         refused = begins & (state.reach_status == REFUSED)
         state.reach_stage[refused] = NONE
         for name in ("course", "course_rate", "weight"):
@@ -427,6 +428,8 @@ class Reach:
             self._tree,
             0.5 * settings.correction_acceleration * dt * dt,
             0.5 * settings.least_speed * dt,
+            self._task,
+            self._bound,
             self._rests,
             self._solution,
             reaching,
@@ -437,7 +440,7 @@ class Reach:
             self._distance,
         )
 
-    def _report(self, state: State, reaching: IntArray, dt: float, parts: ReachState) -> None:
+    def _report(self, reaching: IntArray, dt: float, parts: ReachState) -> None:
         """Tell how the reaches stand."""
         reach_status_crowd(
             self._target,

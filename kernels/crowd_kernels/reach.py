@@ -25,22 +25,25 @@ from crowd_kernels.reach_state import (
 from crowd_kernels.vector import Vector, norm
 
 CHUNKS = 32
+STILL = 1e-3
+"""Targets slower than this stand still, m/s."""
+FAR_OFF = 0.01
+"""Hands closer than this to their goals still come there, m."""
 SHARED_TIME = 0.2
 """Further share of its time that a hand takes while the other one shares the trunk."""
 
 
 @inlined_kernel
 def is_resting(character: int, state: ReachState) -> bool:
-    """Tell whether both hands of a character wait for nothing to come, one of them out of reach."""
-    is_short = False
+    """Tell whether both hands of a character wait for what stands still, one of them far from its goal."""
+    is_far = False
     for arm in range(2):
-        moves = (
-            state.stage[character, arm] != HOLD or norm(vector_of(state.seen_velocity, character, arm)) > 0.0
-        )
-        if moves or state.time_left[character, arm] > 0.0:
+        speed = norm(vector_of(state.seen_velocity, character, arm))
+        if state.stage[character, arm] != HOLD or speed > STILL:
             return False
-        is_short = is_short or state.status[character, arm] == OUT_OF_REACH
-    return is_short
+        missing = norm(vector_of(state.missing_place, character, arm))
+        is_far = is_far or (state.status[character, arm] == OUT_OF_REACH and missing > FAR_OFF)
+    return is_far
 
 
 @inlined_kernel
@@ -111,12 +114,13 @@ def reach_character(
     live_pelvis, live_rotation = pelvis_of(keys, scale, pose, pelvis)
     own = (0.0, 0.0)
     begin = (False, False)
+    weight = (state.weight[character, 0], state.weight[character, 1])
     for arm in range(2):
         if state.stage[character, arm] == NONE:
             continue
         course = state.course[character, arm]
         before = vector_of(state.seen, character, arm)
-        shared = SHARED_TRUNK * state.weight[character, 1 - arm]
+        shared = SHARED_TRUNK * weight[1 - arm]
         is_free = state.rotation_share[character, arm] <= 0.0
         has_jumped, turned = track_target(
             character, arm, position_world, yaw, live_pelvis, size, limits, dt, state
@@ -162,7 +166,7 @@ def reach_character(
             time = max(there * math.sqrt(size), limits.time_per_radian * state.turn[character, arm])
             far = norm(vector_of(state.offset, character, arm))
             slower = SHARED_TIME * time + limits.time_shared * far
-            time += state.weight[character, 1 - arm] * slower
+            time += weight[1 - arm] * slower
         ahead = APEX - course
         if ahead > 0.0 and state.stage[character, arm] != RETURN:
             # On its way there a hand is not at the apex before it has glided to its new target.
@@ -201,7 +205,8 @@ def reach_character(
                 out_kept,
                 out_bound,
             )
-    out_rests[character] = 1 if is_resting(character, state) else 0
+    # Where people walk or sit, hands that are at their goals must make up for what moves them.
+    out_rests[character] = 1 if upper_share <= 0.0 and is_resting(character, state) else 0
 
 
 @parallel_kernel
@@ -285,7 +290,7 @@ def reach_crowd(
         How far joints are bound to approach their limits slowly: hardly where a hand begins or ends, as its
         joints are where the blended motion has them.
     out_rests : (N,) uint8
-        1 for people whose hands both wait, one of them out of reach.
+        1 for people who stand and whose hands both wait, one of them far from its goal.
 
     Notes
     -----

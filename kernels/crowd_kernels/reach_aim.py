@@ -37,6 +37,8 @@ PLACE = 1
 """Task of a hand: position; with rotation it is `BOTH`."""
 BOUND = 0.5
 """Course from which on joints are bound to approach their limits slowly."""
+USUAL_STEP = 1.0 / 60.0
+"""Time in which joints are bound by as much as their course says, s."""
 LATE = 0.5
 """From this course on hands go by where the trunk is that they share, not by their own examples' alone."""
 SHARED_TRUNK = 0.25
@@ -80,7 +82,7 @@ def carried_hand(
                 float(correction[2 * CORRECTED + at] + change[2 * CORRECTED + at]),
             )
             w = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
-            turned = multiply(turned, (w, x, y, z))
+            turned = multiply(turned, normalized((w, x, y, z)))
         turned = multiply(turned, local_rotation(pose, keys.joint[keys.chain[arm, k]], PADDED_JOINTS))
     return place, normalized(turned)
 
@@ -342,7 +344,8 @@ def aim_hand(
     asked = minimum_jerk(state.rotation_share[character, arm])
     kept = kept_share(course, state.course_rate[character, arm] * dt, limits.lead)
     out_kept[character, arm] = kept
-    out_bound[character, arm] = kept * kept * minimum_jerk(min(course / BOUND, 1.0))
+    beginning = minimum_jerk(min(course / BOUND, 1.0))
+    out_bound[character, arm] = kept * kept * math.pow(beginning, dt / USUAL_STEP)
     kept *= math.exp(-limits.missing_rate * dt)
     body, rotation = pelvis_of(keys, scale, pose, pelvis)
     here, turned = place_point(character, arm, scale, body, rotation, keys, state, pose, PADDED_JOINTS)

@@ -25,6 +25,7 @@ LANES = 32
 FAR: Any = np.float32(1e3)
 ZERO: Any = np.float32(0.0)
 ONE: Any = np.float32(1.0)
+TINY: Any = np.float32(1e-6)
 
 
 @inlined_kernel
@@ -205,7 +206,7 @@ def eased_rotation(
 
 @inlined_kernel
 def is_slower(tree: TreeArrays, solution: Any, last: Any, slowest: Any) -> bool:
-    """Tell whether all joints that a tree turns go less far from row to row than an angle, over 2 rad."""
+    """Tell whether all joints that a tree turns go less far from row to row than twice an angle, rad."""
     largest = ZERO
     for k in range(tree.joint.shape[0]):
         if tree.weight[k] > ZERO:
@@ -222,6 +223,8 @@ def keep_corrections(
     tree: TreeArrays,
     most: float,
     slowest: float,
+    task: Any,
+    bound: Any,
     rests: Any,
     solution: Any,
     active: Any,
@@ -242,11 +245,15 @@ def keep_corrections(
     tree : TreeArrays
         K joints, at most 32.
     most : float
-        Largest change of a correction's change, over 2 rad.
+        Largest change of a correction's change: half the angle, rad.
     slowest : float
-        Angle, over 2 rad, that joints of people who rest turn by in a step, or else not at all.
+        Half the angle that joints of people who rest turn by in a step, or else not at all, rad.
+    task : (N, >= E) uint8
+        What is asked of each effector, 0 for nothing.
+    bound : (N, >= E) float32
+        See `start_solves`: joints that are not bound turn as solved, as those of a hand that is nearly back.
     rests : (N,) uint8
-        1 for people who only wait with both hands, one of them out of reach: others go on as solved.
+        1 for people who only wait with both hands, one of them far from its goal: others go on as solved.
     solution : (N, L) float32
         Pose rows that the solves left, unit quaternions.
     active : (A,) int32
@@ -260,7 +267,7 @@ def keep_corrections(
     out_last : (N, L) float32
         In: the last solutions. Out: these, at joints that the tree turns.
     out_distance : (N, 2) float32
-        Written where joints do not turn as solved: farther than any hand is from its target.
+        Written where joints may not turn as solved: farther than any hand is from its target.
 
     Notes
     -----
@@ -290,8 +297,9 @@ def keep_corrections(
                 expected = add(before, (change[k], change[LANES + k], change[2 * LANES + k]))
                 away = subtract(turn, expected)
                 square = dot(away, away)
-                if square > largest * largest:
-                    turn = add(expected, scaled(away, largest / np.sqrt(square)))
+                own = largest / max(share_of(tree, task[character], bound[character], k), TINY)
+                if square > own * own:
+                    turn = add(expected, scaled(away, own / np.sqrt(square)))
                     solved = eased_rotation(tree, k, turn, blended, solved)
                     turn = correction_of(solved, blended)
                     is_eased = True

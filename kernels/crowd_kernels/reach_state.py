@@ -29,7 +29,7 @@ class ReachLimits(NamedTuple):
     time_shared: float
     """Further time where both hands pull at the trunk, over how far inverse kinematics takes a hand, s/m."""
     acceleration: float
-    """A hand that is at its target follows accelerations up to this exactly, m/s^2."""
+    """A hand that is at its target follows accelerations up to this without a glide, m/s^2."""
     target_speed: float
     """Targets that move faster than this are taken to have jumped, m/s."""
     turn_acceleration: float

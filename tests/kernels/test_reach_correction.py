@@ -40,11 +40,13 @@ def vectors(row):
     return row.reshape(3, LANES)[:, : len(TREE.joint)].T.astype(float)
 
 
-def keep(solution, pose, correction, last, change=None, most=10.0, slowest=0.0):
+def keep(solution, pose, correction, last, change=None, most=10.0, slowest=0.0, bound=WHOLE):
     """Keep corrections; gives the distances of hands, 0 where joints are as solved."""
     change = np.zeros_like(correction) if change is None else change
     distance = np.zeros((COUNT, 2), np.float32)
-    keep_corrections(TREE, most, slowest, RESTS, solution, ACTIVE, pose, correction, change, last, distance)
+    keep_corrections(
+        TREE, most, slowest, BOTH, bound, RESTS, solution, ACTIVE, pose, correction, change, last, distance
+    )
     return distance
 
 
@@ -186,3 +188,16 @@ def test_people_who_only_creep_rest_where_both_hands_wait(rng):
     for person in (moving, ACTIVE[1]):
         np.testing.assert_array_equal(local(pose[person])[turning], local(solution[person])[turning])
         assert not distance[person].any()
+
+
+def test_joints_that_are_not_bound_turn_as_solved(rng):
+    """What is left of the correction of a hand that is back would otherwise be dropped in one step."""
+    pose = poses(rng)
+    solution, correction = near(pose, 0.3, rng), np.zeros((COUNT, 3 * LANES), np.float32)
+    bound = np.tile(np.array([1.0, 1e-5], np.float32), (COUNT, 1))
+    keep(solution, pose, correction, np.zeros_like(pose), most=0.001, bound=bound)
+    only_left = (TREE.moves[1] > 0) & (TREE.moves[0] == 0)
+    for person in ACTIVE:
+        same = (local(pose[person]) == local(solution[person])).all(axis=1)
+        assert same[only_left].all()
+        assert not same[TREE.moves[0] > 0].any()
