@@ -50,7 +50,7 @@ REACH_LIMITS = ReachLimits(
     rotation_rate=3.0,
     farthest=0.13,
     missing_rate=8.0,
-    example_time=0.4,
+    example_time=0.35,
 )
 SOLVE = SETTINGS._replace(
     reach=1e3,
@@ -424,6 +424,10 @@ class Reach:
                 self._angle,
                 self._iterations,
             )
+        # Hands that hold one thing between them stay at it whatever their joints must do.
+        carries = reaching[state.carry_stage[reaching] != 0]
+        self._bound[carries] = 0.0
+        self._rests[carries] = 0
         keep_corrections(
             self._tree,
             0.5 * settings.correction_acceleration * dt * dt,

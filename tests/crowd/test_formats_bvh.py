@@ -118,7 +118,8 @@ def test_a_thousand_frames_of_sixty_joints_take_at_most_fifty_milliseconds(
     path = tmp_path / "long.bvh"
     path.write_text(f"{hierarchy}MOTION\nFrames: 1000\nFrame Time: 0.00833333\n{rows}\n")
     best = np.inf
-    for _ in range(5):
+    # Other work on the machine is not what is measured.
+    for _ in range(20):
         begin = time.perf_counter()
         motion = read_motions(path)[0]
         best = min(best, time.perf_counter() - begin)
