@@ -406,7 +406,7 @@ class Reach:
                 continue
             solve_crowd(
                 tree,
-                solve_settings(self.settings, dt, mask == BOTH_HANDS),
+                solve_settings(settings, dt, mask == BOTH_HANDS),
                 self._segment_scale,
                 self._task,
                 self._point,
