@@ -18,7 +18,7 @@ Float32Array = npt.NDArray[np.float32]
 IntArray = npt.NDArray[np.int32]
 
 KEYS_PER_CYCLE = 64
-KEY_RATE = 30.0
+KEY_RATE = 45.0
 """Keys per second of clips that are not locomotion."""
 SAME_TIME = 1e-6
 """Events closer than this coincide, s."""

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from crowd.bench.reachers import angular_motion
 from crowd.bench.sweep import largest_acceleration
 from crowd.blending.parameter_space import ParameterSpace
 from crowd.controllers.foot_lock import leg_arrays
@@ -226,6 +227,14 @@ def test_people_who_stand_keep_their_feet_and_move_calmly(clip):
             (clip.rotation_local[frame, arms] * LIBRARY.clip("idle").rotation_local[0, arms]).sum(axis=1)
         )
         assert np.degrees(2 * np.arccos(np.clip(dots.min(), -1, 1))) < 6, "begins and ends with hanging arms"
+
+
+@pytest.mark.parametrize("clip", LIBRARY.of_kind(ClipKind.IDLE), ids=lambda clip: clip.name)
+def test_people_who_stand_for_long_do_not_jump_where_their_clip_goes_round(clip):
+    twice = np.concatenate([clip.rotation_local[:-1], clip.rotation_local[:-1]]).astype(np.float64)
+    once = angular_motion(clip.rotation_local[:, None].astype(np.float64), 1.0 / clip.frame_rate)
+    assert angular_motion(twice[:, None], 1.0 / clip.frame_rate)[1] < 1.001 * once[1] + 0.01
+    np.testing.assert_allclose(clip.pelvis_position_root[-1], clip.pelvis_position_root[0], atol=1e-6)
 
 
 def test_starts_begin_standing_and_stops_end_standing():

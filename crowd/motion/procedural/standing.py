@@ -56,7 +56,9 @@ class Stance:
         """Stand upright with hanging arms, breathing."""
         time = np.arange(round(seconds * FRAME_RATE) + 1) / FRAME_RATE
         zero = np.zeros_like(time)
-        breath = np.sin(2.0 * np.pi * time / BREATH_SECONDS)
+        # A whole number of breaths, so that clips that go round do not jump where they do.
+        breaths = max(round(seconds / BREATH_SECONDS), 1)
+        breath = np.sin(2.0 * np.pi * breaths * time / max(seconds, BREATH_SECONDS))
         arm = [0.03 + 0.008 * breath, 0.14 + 0.01 * breath, 0.26 + zero, 0.12 + zero, zero]
         return cls(
             time,
@@ -87,7 +89,9 @@ class Stance:
         )
 
 
-def build_stance(skeleton: Skeleton, shape: GaitShape, stance: Stance) -> tuple[FloatArray, FloatArray]:
+def build_stance(
+    skeleton: Skeleton, shape: GaitShape, stance: Stance, is_cyclic: bool
+) -> tuple[FloatArray, FloatArray]:
     """Local rotations (F, J, 4) and pelvis positions (F, 3) of a standing person on flat, fixed feet."""
     count = len(stance.time)
     rotation = np.zeros((count, skeleton.joint_count, 4))
@@ -108,7 +112,7 @@ def build_stance(skeleton: Skeleton, shape: GaitShape, stance: Stance) -> tuple[
         feet[side] = FootPath(ankle, zero, zero + sign * shape.toe_out, zero)
     hips = np.array([skeleton.offset[skeleton.joint(f"{side}_thigh")] for side in feet])
     ankles = np.array([foot.ankle for foot in feet.values()])
-    pelvis = lower_pelvis(pelvis, pelvis_rotation, hips, ankles, is_cyclic=False, frames=8)
+    pelvis = lower_pelvis(pelvis, pelvis_rotation, hips, ankles, is_cyclic, frames=8)
     for side, foot in feet.items():
         bend_leg(skeleton, side, pelvis, pelvis_rotation, foot, rotation)
     for name, share in SPINE_SHARE.items():
@@ -135,7 +139,8 @@ def to_clip(
     skeleton: Skeleton, shape: GaitShape, name: str, kind: ClipKind, stance: Stance, mask: JointMask
 ) -> Clip:
     """Make a clip of a standing person."""
-    rotation, pelvis = build_stance(skeleton, shape, stance)
+    is_cyclic = kind is ClipKind.IDLE
+    rotation, pelvis = build_stance(skeleton, shape, stance, is_cyclic)
     count = len(stance.time)
     return Clip(
         name,
@@ -145,7 +150,7 @@ def to_clip(
         pelvis.astype(np.float32),
         np.zeros((count, 3)),
         np.zeros(count),
-        is_cyclic=kind is ClipKind.IDLE,
+        is_cyclic=is_cyclic,
         mask=mask,
     )
 
