@@ -6,7 +6,7 @@ Arguments named `q`, `a` and `b` are unit quaternions unless stated otherwise; `
 import math
 
 from crowd_kernels._jit import kernel
-from crowd_kernels.vector import Vector, cross, dot, norm, scaled
+from crowd_kernels.vector import Vector, add, cross, dot, norm, scaled, subtract
 
 Quaternion = tuple[float, float, float, float]
 
@@ -132,6 +132,63 @@ def rotation_vector(q: Quaternion) -> Vector:
     if sine < SMALL_ANGLE:
         return scaled(axis, 2.0)
     return scaled(axis, 2.0 * math.atan2(sine, sign * q[0]) / sine)
+
+
+@kernel
+def angular_velocity(v: Vector, rate: Vector) -> Vector:
+    """Find how fast a rotation turns whose rotation vector changes.
+
+    Parameters
+    ----------
+    v : tuple of float
+        Rotation vector, at most half a turn, rad.
+    rate : tuple of float
+        How it changes, rad/s.
+
+    Returns
+    -------
+    tuple of float
+        Angular velocity in the frame around the rotation, rad/s.
+
+    Notes
+    -----
+    **Source:** the left Jacobian of SO(3); Barfoot, "State estimation for robotics", 2017, equation 7.77.
+    """
+    angle = norm(v)
+    across = cross(v, rate)
+    # Limits for small angles; else they are differences of numbers that are nearly the same.
+    once, twice = 0.5, 1.0 / 6.0
+    if angle > 1e-3:
+        once = (1.0 - math.cos(angle)) / (angle * angle)
+        twice = (angle - math.sin(angle)) / (angle * angle * angle)
+    return add(add(rate, scaled(across, once)), scaled(cross(v, across), twice))
+
+
+@kernel
+def rotation_vector_rate(v: Vector, velocity: Vector) -> Vector:
+    """Find how a rotation vector changes as the rotation turns: the inverse of `angular_velocity`.
+
+    Parameters
+    ----------
+    v : tuple of float
+        Rotation vector, at most half a turn, rad.
+    velocity : tuple of float
+        Angular velocity in the frame around the rotation, rad/s.
+
+    Returns
+    -------
+    tuple of float
+        rad/s.
+
+    Notes
+    -----
+    **Source:** the inverse of the left Jacobian of SO(3); Barfoot, as above, equation 7.76.
+    """
+    angle = norm(v)
+    half = 0.5 * angle
+    share = 1.0 / 12.0 if angle < 1e-3 else (1.0 - half / math.tan(half)) / (angle * angle)
+    across = cross(v, velocity)
+    return add(subtract(velocity, scaled(across, 0.5)), scaled(cross(v, across), share))
 
 
 @kernel

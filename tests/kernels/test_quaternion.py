@@ -176,3 +176,25 @@ def test_mixing_starts_at_one_and_ends_at_the_other(mix, a, b):
 def test_axes_are_turned_back_into_their_rotation(q):
     axes = [tuple(column) for column in oracle.matrix(q).T]
     assert abs(np.dot(kernels.from_axes(*axes), q)) == pytest.approx(1, abs=1e-12)
+
+
+turns = st.tuples(number, number, number).map(lambda v: tuple(np.multiply(v, 0.9 * math.pi / 20.0)))
+
+
+@given(v=turns, rate=st.tuples(number, number, number))
+def test_angular_velocity_is_that_of_the_rotation_whose_vector_changes(v, rate):
+    step = 1e-6
+    before, after = (
+        kernels.from_rotation_vector(tuple(np.add(v, np.multiply(rate, s)))) for s in (-step, step)
+    )
+    turned = kernels.rotation_vector(kernels.multiply(after, kernels.conjugate(before)))
+    found = kernels.angular_velocity(v, rate)
+    np.testing.assert_allclose(found, np.divide(turned, 2.0 * step), atol=1e-4)
+
+
+@given(
+    v=turns | st.just((0.0, 0.0, 0.0)) | st.just((1e-4, 0.0, -1e-4)), rate=st.tuples(number, number, number)
+)
+def test_rates_of_rotation_vectors_and_angular_velocities_are_inverse(v, rate):
+    velocity = kernels.angular_velocity(v, rate)
+    np.testing.assert_allclose(kernels.rotation_vector_rate(v, velocity), rate, atol=1e-6)
