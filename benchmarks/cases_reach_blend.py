@@ -59,7 +59,7 @@ class MovingHands:
         State of the reaches as kernels take it.
     number, real, rows : array
         What the kernel works in.
-    task, place, rotation, kept, bound, rests : array
+    task, place, rotation, kept, bound : array
         What `reach_crowd` asks of inverse kinematics.
     round : int
     """
@@ -82,7 +82,6 @@ class MovingHands:
     rotation: npt.NDArray[np.float32]
     kept: npt.NDArray[np.float32]
     bound: npt.NDArray[np.float32]
-    rests: npt.NDArray[np.uint8]
     round: int = 0
 
 
@@ -125,7 +124,6 @@ def set_up(size: int, rng: np.random.Generator) -> MovingHands:
         aligned_zeros((size, 2, 4), np.float32),
         aligned_zeros((size, 2), np.float32),
         aligned_zeros((size, 2), np.float32),
-        aligned_zeros(size, np.uint8),
     )
     # Reaches begin at rest, where they take up their examples.
     hands.course = np.zeros_like(course)
@@ -172,7 +170,6 @@ def run(hands: MovingHands) -> None:
         hands.rotation,
         hands.kept,
         hands.bound,
-        hands.rests,
     )
 
 
@@ -264,11 +261,14 @@ def blend(hands: MovingHands, weight: FloatArray, course: FloatArray) -> tuple[F
     for clip in range(weight.shape[1]):
         rows = np.flatnonzero(weight[:, clip] != 0.0)
         place = course[rows] * keys.apex[clip]
-        before = np.minimum(place.astype(np.int64), keys.key_count[clip] - 2)
-        later = (place - before)[:, None]
-        key, own = keys.first_key[clip] + before, weight[rows, clip][:, None]
-        rotation[rows] += own * ((1.0 - later) * keys.rotation[key] + later * keys.rotation[key + 1])
-        pelvis[rows] += own * ((1.0 - later) * keys.pelvis[key] + later * keys.pelvis[key + 1])
+        middle = np.clip(np.floor(place + 0.5).astype(np.int64), 1, keys.key_count[clip] - 2)
+        for key in range(-1, 2):
+            # Quadratic B-splines, whose end pieces go on to the ends.
+            along = place - middle
+            share = 0.75 - along**2 if key == 0 else 0.5 * (0.5 + key * along) ** 2
+            own = (weight[rows, clip] * share)[:, None]
+            rotation[rows] += own * keys.rotation[keys.first_key[clip] + middle + key]
+            pelvis[rows] += own * keys.pelvis[keys.first_key[clip] + middle + key]
     rotation = rotation.reshape(-1, 4, JOINTS)[:, :, : len(keys.joint)].transpose(0, 2, 1)
     return rotation / np.linalg.norm(rotation, axis=2, keepdims=True), pelvis
 

@@ -21,7 +21,7 @@ from crowd.errors import RecordingError, describe
 if TYPE_CHECKING:
     from crowd.simulation import Simulation
 
-FORMAT = 4
+FORMAT = 5
 """Counts up when the meaning of arrays changes; other names of arrays tell by themselves."""
 BEGIN = b"PK\x03\x04"
 """How a file begins that `save` has written: it is an archive of arrays."""

@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from crowd.arguments import number, rotations_of, shown, vectors
-from crowd.controllers.carrying import FREE
 from crowd.controllers.grab import CLOSING, HOLDING, GrabStatus
 from crowd.errors import SettingsError, describe
 from crowd.motion.clip import ClipKind
 from crowd.people import HANDING_HEIGHT
 from crowd.scenario.task_table import TaskTable
+from crowd.state import FREE
 from crowd.tasks.execution import encode_tasks
 
 if TYPE_CHECKING:

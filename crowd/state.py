@@ -22,6 +22,11 @@ LongArray = npt.NDArray[np.int64]
 ByteArray = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
 
+FREE, PLACING, CARRYING, STOPPED, WAITING = range(5)
+"""Values of `State.carry_stage`: nothing is between both hands; it goes to or stays at a place in the world;
+it is kept before the body; the place was refused, and it stays where it was against the body; it is kept
+before the body until the person stands, and then goes to its place."""
+
 
 COUNTS = ("spawn_count", "visit_count", "reach_count", "_refusals")
 """Ends of names of what goes on counting when another person enters through a slot."""
@@ -208,8 +213,13 @@ class State:
     """Course of the reach: 0 at rest, 1 at the target, 2 at rest again. (character, 2)"""
     reach_course_rate: FloatArray = _array(2)
     """Rate of change of `reach_course`, 1/s. (character, 2)"""
+    reach_waited: FloatArray = _array()
+    """For how long both hands have waited of a person who stands, one of them far from its goal, s.
+    (character,)"""
     reach_weight: FloatArray = _array(2)
     """Share of the reach in the pose, 0 to 1. (character, 2)"""
+    reach_lead_time: FloatArray = _array(2)
+    """Least time between rest and goal, s. (character, 2)"""
     reach_seen: FloatArray = _array(2, 3)
     """Target in the root frame as last seen, m. (character, 2, 3)"""
     reach_seen_velocity: FloatArray = _array(2, 3)
@@ -314,8 +324,7 @@ class State:
     """1 where the segment touches the object. (character, 2, 15)"""
 
     carry_stage: ByteArray = _array(dtype=np.uint8)
-    """What both hands do with what they hold: 0 nothing, 1 it goes to or stays at a place, 2 it is carried
-    before the body, 3 its place was refused, 4 it is carried until the person stands. (character,)"""
+    """What both hands do with what they hold between them, see `FREE`. (character,)"""
     carry_progress: FloatArray = _array()
     """Progress from where the object set out to where it goes, 0 to 1. (character,)"""
     carry_seconds: FloatArray = _array()

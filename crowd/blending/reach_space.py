@@ -9,18 +9,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import spline_filter1d
 from scipy.spatial import Delaunay, cKDTree
 from scipy.stats import qmc
 
 from crowd.blending.reach_cubes import along_curve, divide_space
 from crowd.errors import MotionError, describe
 from crowd.motion.clip import Clip
-from crowd.motion.clip_table import rows, sample_keys
+from crowd.motion.clip_table import key_intervals, rows, sample_keys
 from crowd.motion.rotation import multiply, rotate
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd_kernels.aligned import aligned_copy, aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
-from crowd_kernels.reach_blend import JOINTS, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys
+from crowd_kernels.reach_blend import JOINTS, LEFT_ARM, LOWER, RIGHT_ARM, ROW, UPPER, ReachKeys, key_shares
 from crowd_kernels.reach_space import (
     BLENDED,
     BLOCK,
@@ -50,8 +52,12 @@ WIDEST_TURN = np.radians(75.0)
 """Examples farther apart than this about the body's axis are not blended, rad."""
 SEED = 5
 SIDES = ("right", "left")
-KEY_RATE = 60.0
-"""Keys per second; lower rates would show as jerks."""
+FRAME_RATE = 60.0
+"""Frames per second that are read of examples."""
+KEY_RATE = 30.0
+"""Keys per second of the curves through them."""
+FEWEST_INTERVALS = 2
+"""Curves have at least three keys."""
 ARM_PARTS = ("clavicle", "upper_arm", "forearm", "hand")
 LEG_PARTS = ("thigh", "shank", "foot", "toe")
 
@@ -194,12 +200,17 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
     if len(joints) > JOINTS:
         raise MotionError(describe("reach", "too many joints of the body", len(joints), f"at most {JOINTS}"))
     clips = [clip for part in sets for clip in part]
-    sampled = [sample_keys(clip, KEY_RATE) for clip in clips]
-    count = np.array([len(rotation) for rotation, _ in sampled], np.int32)
-    first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
+    sampled = [sample_keys(clip, FRAME_RATE) for clip in clips]
+    frames = np.cumsum([len(rotation) for rotation, _ in sampled])[:-1]
     padded = rows(np.concatenate([rotation[:, joints] for rotation, _ in sampled]))
-    rotation = padded.reshape(-1, 4, PADDED_JOINTS)[:, :, :JOINTS].reshape(-1, ROW)
-    pelvis = np.concatenate([pelvis for _, pelvis in sampled]).astype(np.float32)
+    compact = padded.reshape(-1, 4, PADDED_JOINTS)[:, :, :JOINTS].reshape(-1, ROW)
+    curves = [control_points(part, clip) for part, clip in zip(np.split(compact, frames), clips, strict=True)]
+    count = np.array([len(curve) for curve in curves], np.int32)
+    first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
+    rotation = np.concatenate(curves)
+    pelvis = np.concatenate(
+        [control_points(part, clip) for (_, part), clip in zip(sampled, clips, strict=True)]
+    )
     apex_time = np.array([clip.reach.apex for clip in clips if clip.reach is not None])
     end_time = np.array([clip.duration for clip in clips])
     member = np.zeros((4, JOINTS), np.float32)
@@ -228,6 +239,14 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
     )
 
 
+def control_points(frames: npt.NDArray[np.float32], clip: Clip) -> npt.NDArray[np.float32]:
+    """Control points (k, L) of a smooth curve through frames (F, L) of a clip, see `key_shares`."""
+    count = max(key_intervals(clip, KEY_RATE), FEWEST_INTERVALS) + 1
+    curve = CubicSpline(np.linspace(0.0, 1.0, len(frames)), frames)
+    points = spline_filter1d(curve(np.linspace(0.0, 1.0, count)), order=2, axis=0, mode="mirror")
+    return np.asarray(points, np.float32)
+
+
 def rest_position(skeleton: Skeleton, joint: int) -> FloatArray:
     """Place of a joint in the rest pose, m."""
     place = np.zeros(3)
@@ -241,16 +260,15 @@ def apex_examples(
     skeleton: Skeleton, clips: tuple[Clip, ...], keys: ReachKeys, members: npt.NDArray[np.integer]
 ) -> ReachExamples:
     """Poses of examples at their apex, interpolated between keys as the blend does, and where the hand is."""
-    place = (keys.first_key + keys.apex)[members]
-    before = np.floor(place).astype(int)
-    after = np.minimum(before + 1, len(keys.rotation) - 1)
-    share = (place - before)[:, None]
+    shares = [key_shares(keys.apex[number], keys.key_count[number]) for number in members]
+    key = keys.first_key[members] + [first for first, *_ in shares]
+    own = np.array([parts for _, *parts in shares])
     label = clips[0].reach
     side = label.side if label is not None else SIDES[0]
-    row = (1.0 - share) * keys.rotation[before] + share * keys.rotation[after]
+    row = sum(own[:, [k]] * keys.rotation[key + k] for k in range(3))
     rotation = row.reshape(-1, 4, JOINTS)[:, :, keys.chain[SIDES.index(side)]].transpose(0, 2, 1)
     rotation = rotation / np.linalg.norm(rotation, axis=2, keepdims=True)
-    pelvis = (1.0 - share) * keys.pelvis[before] + share * keys.pelvis[after]
+    pelvis = sum(own[:, [k]] * keys.pelvis[key + k] for k in range(3))
     position = hand_position(skeleton, side, rotation, pelvis)
     return ReachExamples(clips, side, position, rotation, pelvis)
 

@@ -15,14 +15,20 @@ from crowd.model import Model
 from crowd.motion.easing import minimum_jerk
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, to_vector
 from crowd.people import shoulders_world
-from crowd.state import BoolArray, FloatArray, IntArray, State
+from crowd.state import (
+    CARRYING,
+    FREE,
+    PLACING,
+    STOPPED,
+    WAITING,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    State,
+)
 from crowd_kernels.reach_goal import is_inside_body
 from crowd_kernels.reach_state import HOLD, MOVE, MOVING, OUT_OF_REACH, REFUSED
 
-FREE, PLACING, CARRYING, STOPPED, WAITING = range(5)
-"""Stages: nothing between both hands; it goes to or stays at a place in the world; it is kept before the
-body; the place was refused, and it stays where it was against the body; it is kept before the body until the
-person stands, and then goes to its place."""
 WALKING, STANDING = 0.5, 0.1
 """Shares of locomotion from which on a person walks, and down to which it stands."""
 

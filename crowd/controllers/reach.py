@@ -22,7 +22,7 @@ from crowd.motion.mirror import mirrored, opposite
 from crowd.motion.procedural.reaching import seated_reaches, standing_reaches
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.people import shoulders_world
-from crowd.state import FloatArray, IntArray, State
+from crowd.state import FREE, FloatArray, IntArray, State
 from crowd.world import World
 from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
@@ -47,6 +47,8 @@ REACH_LIMITS = ReachLimits(
     body_radius=0.10,
     turn_back=3.0,
     lead=0.8,
+    lead_acceleration=25.0,
+    weight_change=0.25,
     rotation_rate=3.0,
     farthest=0.13,
     missing_rate=8.0,
@@ -86,11 +88,13 @@ class ReachSettings:
     fade_rate: float = 6.0
     """Rate with which turns of joints fade that the targets do not ask for, 1/s. Where it is larger, hands
     stop short of rotations far from the blended ones, since damped steps make up for less than fades."""
-    correction_acceleration: float = 40.0
+    correction_acceleration: float = 30.0
     """Largest angular acceleration of what inverse kinematics turns joints, rad/s^2; limits come first."""
-    least_speed: float = 0.06
-    """Where both hands wait that cannot both be where they should, joints turn faster than this or rest,
-    rad/s."""
+    shared_correction_acceleration: float = 40.0
+    """Likewise where both hands reach, which push joints to their limits more often."""
+    rest_acceleration: float = 0.1
+    """Where both hands wait that cannot both be where they should, joints turn faster than this times the
+    time they have waited, or rest, rad/s^2."""
     limit_rate: float = 8.0
     """Rate with which joints approach their limits at most, 1/s; larger: harder stops."""
     tolerance: float = 7e-4
@@ -158,7 +162,6 @@ class Reach:
         self._point = aligned_zeros((capacity, 2, 3), np.float32)
         self._target = aligned_zeros((capacity, 2, 3), np.float32)
         self._bound = aligned_zeros((capacity, 2), np.float32)
-        self._rests = aligned_zeros(capacity, np.uint8)
         self._kept = aligned_zeros((capacity, 2), np.float32)
         self._target_rotation = aligned_zeros((capacity, 2, 4), np.float32)
         self._status = aligned_zeros((capacity, 2), np.uint8)
@@ -270,6 +273,7 @@ class Reach:
             "time_left",
             "seen_velocity",
             "bulge",
+            "lead_time",
             "turn",
             "turn_before",
             "rotation_rate",
@@ -358,7 +362,6 @@ class Reach:
             self._target_rotation,
             self._kept,
             self._bound,
-            self._rests,
         )
         blended = time.perf_counter()
         self._solve(state, reaching, step.dt)
@@ -425,24 +428,29 @@ class Reach:
                 self._iterations,
             )
         # Hands that hold one thing between them stay at it whatever their joints must do.
-        carries = reaching[state.carry_stage[reaching] != 0]
+        carries = reaching[state.carry_stage[reaching] != FREE]
         self._bound[carries] = 0.0
-        self._rests[carries] = 0
-        keep_corrections(
-            self._tree,
-            0.5 * settings.correction_acceleration * dt * dt,
-            0.5 * settings.least_speed * dt,
-            self._task,
-            self._bound,
-            self._rests,
-            self._solution,
-            reaching,
-            state.pose_rotation,
-            state.reach_correction,
-            state.reach_correction_change,
-            state.reach_last_rotation,
-            self._distance,
-        )
+        state.reach_waited[carries] = 0.0
+        shared = hands == BOTH_HANDS
+        for rows, acceleration in (
+            (reaching[~shared], settings.correction_acceleration),
+            (reaching[shared], settings.shared_correction_acceleration),
+        ):
+            keep_corrections(
+                self._tree,
+                0.5 * acceleration * dt * dt,
+                0.5 * settings.rest_acceleration * dt,
+                self._task,
+                self._bound,
+                state.reach_waited,
+                self._solution,
+                rows,
+                state.pose_rotation,
+                state.reach_correction,
+                state.reach_correction_change,
+                state.reach_last_rotation,
+                self._distance,
+            )
 
     def _report(self, reaching: IntArray, dt: float, parts: ReachState) -> None:
         """Tell how the reaches stand."""

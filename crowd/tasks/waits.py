@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from crowd.controllers.carrying import CARRYING
 from crowd.controllers.controller import Step
 from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
-from crowd.state import BoolArray, IntArray
+from crowd.state import CARRYING, BoolArray, IntArray
 from crowd.tasks.present_task import does
 from crowd.tasks.settle import is_settled
 from crowd.tasks.task_list import Hand, TaskKind

@@ -1,11 +1,10 @@
 """Reaching: poses of many characters, and the targets that inverse kinematics takes their hands to."""
 
-import math
 from typing import Any
 
 from crowd_kernels._jit import inlined_kernel, parallel_kernel, prange
 from crowd_kernels.reach_aim import SHARED_TRUNK, aim_hand
-from crowd_kernels.reach_blend import ReachKeys, blend_body
+from crowd_kernels.reach_blend import ROW, ReachKeys, blend_body, read_joints
 from crowd_kernels.reach_course import advance_course, course_shares
 from crowd_kernels.reach_examples import find_examples, follow_weights
 from crowd_kernels.reach_glide import plan_glide
@@ -13,28 +12,25 @@ from crowd_kernels.reach_goal import follow_rotation, track_target
 from crowd_kernels.reach_place import pelvis_of
 from crowd_kernels.reach_space import ReachArrays
 from crowd_kernels.reach_state import (
-    APEX,
     HOLD,
     NONE,
     OUT_OF_REACH,
-    RETURN,
     ReachLimits,
     ReachState,
     vector_of,
 )
+from crowd_kernels.reach_time import reach_time, set_out
 from crowd_kernels.vector import Vector, norm
 
 CHUNKS = 32
 STILL = 1e-3
 """Targets slower than this stand still, m/s."""
-FAR_OFF = 0.01
+FAR_OFF = 0.003
 """Hands closer than this to their goals still come there, m."""
-SHARED_TIME = 0.2
-"""Further share of its time that a hand takes while the other one shares the trunk."""
 
 
 @inlined_kernel
-def is_resting(character: int, state: ReachState) -> bool:
+def is_waiting(character: int, state: ReachState) -> bool:
     """Tell whether both hands of a character wait for what stands still, one of them far from its goal."""
     is_far = False
     for arm in range(2):
@@ -73,7 +69,6 @@ def reach_character(
     out_target_rotation: Any,
     out_kept: Any,
     out_bound: Any,
-    out_rests: Any,
 ) -> None:
     """Advance both hands of one character, blend its pose, and set the targets of inverse kinematics.
 
@@ -112,13 +107,14 @@ def reach_character(
     All other arguments are those of `reach_crowd`.
     """
     live_pelvis, live_rotation = pelvis_of(keys, scale, pose, pelvis)
+    live = rows[2 * ROW : 3 * ROW]
+    read_joints(keys, pose, live)
     own = (0.0, 0.0)
     begin = (False, False)
     weight = (state.weight[character, 0], state.weight[character, 1])
     for arm in range(2):
         if state.stage[character, arm] == NONE:
             continue
-        course = state.course[character, arm]
         before = vector_of(state.seen, character, arm)
         shared = SHARED_TRUNK * weight[1 - arm]
         is_free = state.rotation_share[character, arm] <= 0.0
@@ -160,17 +156,8 @@ def reach_character(
             )
         follow_rotation(character, arm, turned, limits, dt, state)
         there, back = follow_weights(character, arm, limits, keys, dt, state)
-        # Long limbs move more slowly (dynamic similarity).
-        time = state.seconds[character, arm]
-        if time <= 0.0:
-            time = max(there * math.sqrt(size), limits.time_per_radian * state.turn[character, arm])
-            far = norm(vector_of(state.offset, character, arm))
-            slower = SHARED_TIME * time + limits.time_shared * far
-            time += weight[1 - arm] * slower
-        ahead = APEX - course
-        if ahead > 0.0 and state.stage[character, arm] != RETURN:
-            # On its way there a hand is not at the apex before it has glided to its new target.
-            time = max(time, state.time_left[character, arm] / ahead)
+        set_out(character, arm, walking_share, keys, limits, state, live, rows[:ROW])
+        time = reach_time(character, arm, there, size, weight[1 - arm], limits, state)
         advance_course(character, arm, 1.0 / time, there / (back * time), limits, dt, state)
         if state.stage[character, arm] != NONE:
             share, _ = course_shares(state.course[character, arm], limits.lead)
@@ -206,7 +193,8 @@ def reach_character(
                 out_bound,
             )
     # Where people walk or sit, hands that are at their goals must make up for what moves them.
-    out_rests[character] = 1 if upper_share <= 0.0 and is_resting(character, state) else 0
+    waits = upper_share <= 0.0 and is_waiting(character, state)
+    state.waited[character] = state.waited[character] + dt if waits else 0.0
 
 
 @parallel_kernel
@@ -236,7 +224,6 @@ def reach_crowd(
     out_target_rotation: Any,
     out_kept: Any,
     out_bound: Any,
-    out_rests: Any,
 ) -> None:
     """Advance the reaches of many characters, blend their poses, and set the targets of inverse kinematics.
 
@@ -289,8 +276,6 @@ def reach_crowd(
     out_bound : (N, 2) float32
         How far joints are bound to approach their limits slowly: hardly where a hand begins or ends, as its
         joints are where the blended motion has them.
-    out_rests : (N,) uint8
-        1 for people who stand and whose hands both wait, one of them far from its goal.
 
     Notes
     -----
@@ -331,5 +316,4 @@ def reach_crowd(
                 out_target_rotation,
                 out_kept,
                 out_bound,
-                out_rests,
             )

@@ -12,17 +12,15 @@ from crowd_kernels.quaternion import (
     from_rotation_vector,
     multiply,
     normalized,
-    rotate,
     rotation_vector,
     slerp,
 )
-from crowd_kernels.reach_blend import CHAIN, ROW, ReachKeys
+from crowd_kernels.reach_blend import CHAIN, JOINTS, ROW, ReachKeys, read_joints
 from crowd_kernels.reach_correction import LANES as CORRECTED
 from crowd_kernels.reach_course import course_shares, kept_share
 from crowd_kernels.reach_glide import glide, goal_now, shortened
 from crowd_kernels.reach_missing import BOTH, spare_missing_place, spare_missing_turn
 from crowd_kernels.reach_place import (
-    bone_of,
     local_rotation,
     pelvis_of,
     place_alone,
@@ -46,45 +44,32 @@ SHARED_TRUNK = 0.25
 
 
 @inlined_kernel
-def carried_hand(
-    keys: ReachKeys, arm: int, scale: Any, pelvis: Vector, pose: Any, correction: Any, change: Any
-) -> tuple[Vector, Quaternion]:
-    """Find where a hand would be if only the trunk were corrected, as it will be if it goes on as it did.
+def turn_trunk(keys: ReachKeys, correction: Any, change: Any, row: Any) -> None:
+    """Turn the joints that both hands share as they will be corrected if that goes on as it did.
 
     Parameters
     ----------
     keys : ReachKeys
-    arm : int
-    scale : (G,) float32
-        Proportions.
-    pelvis : tuple of float
-        Root frame, m.
-    pose : (256,) float32
-        Pose row, blended.
     correction, change : (96,) float32
         Rows of `reach_correction` and `reach_correction_change`.
-
-    Returns
-    -------
-    tuple of float, tuple of float
-        Position, m, and rotation of the hand, root frame.
+    row : (96,) float32
+        In and out: compact row.
     """
-    place = pelvis
-    turned = (1.0, 0.0, 0.0, 0.0)
     for k in range(CHAIN):
-        if k > 0:
-            place = add(place, rotate(turned, bone_of(keys, arm, k, scale)))
-        if keys.chain[0, k] == keys.chain[1, k]:
-            at = keys.chain_place[arm, k]
+        joint = keys.chain[0, k]
+        if joint == keys.chain[1, k]:
+            at = keys.chain_place[0, k]
             x, y, z = (
                 float(correction[at] + change[at]),
                 float(correction[CORRECTED + at] + change[CORRECTED + at]),
                 float(correction[2 * CORRECTED + at] + change[2 * CORRECTED + at]),
             )
             w = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
-            turned = multiply(turned, normalized((w, x, y, z)))
-        turned = multiply(turned, local_rotation(pose, keys.joint[keys.chain[arm, k]], PADDED_JOINTS))
-    return place, normalized(turned)
+            turned = multiply(normalized((w, x, y, z)), local_rotation(row, joint, JOINTS))
+            row[joint] = turned[0]
+            row[JOINTS + joint] = turned[1]
+            row[2 * JOINTS + joint] = turned[2]
+            row[3 * JOINTS + joint] = turned[3]
 
 
 @inlined_kernel
@@ -110,6 +95,7 @@ def leave_trunk(
     keys: ReachKeys,
     limits: ReachLimits,
     state: ReachState,
+    row: Any,
     pose: Any,
     correction: Any,
     change: Any,
@@ -125,6 +111,8 @@ def leave_trunk(
         Rotation of the hand likewise.
     pelvis : tuple of float
         Root frame, m.
+    row : (96,) float32
+        Scratch.
 
     Returns
     -------
@@ -139,8 +127,11 @@ def leave_trunk(
     left = share_of_other(character, arm, risen, limits, state)
     if left <= 0.0:
         return here, turned
-    carried, carried_turn = carried_hand(keys, arm, scale, pelvis, pose, correction, change)
-    carried = add(carried, rotate(carried_turn, vector_of(state.point_hand, character, arm)))
+    read_joints(keys, pose, row)
+    turn_trunk(keys, correction, change, row)
+    carried, carried_turn = place_point(
+        character, arm, scale, pelvis, local_rotation(row, 0, JOINTS), keys, state, row, JOINTS
+    )
     return add(here, scaled(subtract(carried, here), left)), slerp(turned, carried_turn, left)
 
 
@@ -372,7 +363,7 @@ def aim_hand(
         rows,
     )
     here, turned = leave_trunk(
-        character, arm, here, turned, scale, body, keys, limits, state, pose, correction, change
+        character, arm, here, turned, scale, body, keys, limits, state, row, pose, correction, change
     )
     goal, wanted = goal_now(
         character, arm, apex, apex_turned, scale, live_pelvis, live_rotation, keys, state, row

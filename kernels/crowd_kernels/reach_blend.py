@@ -33,13 +33,14 @@ class ReachKeys(NamedTuple):
     """Key frames of all examples and the joints that they hold."""
 
     rotation: npt.NDArray[np.float32]
-    """(K, 96) Compact pose rows, signs aligned over all keys."""
+    """(K, 96) Compact pose rows, control points of the curves that `key_shares` describes; signs aligned over
+    all keys."""
     pelvis: npt.NDArray[np.float32]
-    """(K, 3) Pelvis in the root frame, m."""
+    """(K, 3) Pelvis in the root frame likewise, m."""
     first_key: npt.NDArray[np.int32]
     """(E,) First key of each example."""
     key_count: npt.NDArray[np.int32]
-    """(E,) Keys of each example."""
+    """(E,) Keys of each example, at least 3."""
     apex: npt.NDArray[np.float64]
     """(E,) Place of the apex among an example's keys."""
     apex_time: npt.NDArray[np.float64]
@@ -69,18 +70,58 @@ class ReachKeys(NamedTuple):
 
 
 @inlined_kernel
-def blend_row(key: Any, next_key: Any, weight: Any, next_weight: Any, out_sum: Any) -> None:
-    """Add the weighted sum of two compact rows to a row.
+def key_shares(place: float, count: int) -> tuple[int, float, float, float]:
+    """Find which three keys of an example make up its pose, and their shares.
 
     Parameters
     ----------
-    key, next_key : (96,) float32
-    weight, next_weight : float32
+    place : float
+        Place among the keys, 0 to count - 1.
+    count : int
+        Keys of the example, at least 3.
+
+    Returns
+    -------
+    int
+        The first of the three.
+    float, float, float
+        Shares; their sum is 1.
+
+    Notes
+    -----
+    **Source:** quadratic B-splines; de Boor, "A practical guide to splines", 1978. The velocities of joints
+    change evenly from key to key; on straight lines between keys they would change all at once.
+    """
+    middle = min(max(int(place + 0.5), 1), count - 2)
+    along = place - middle
+    before = 0.5 * (0.5 - along) * (0.5 - along)
+    after = 0.5 * (0.5 + along) * (0.5 + along)
+    return middle - 1, before, 1.0 - before - after, after
+
+
+@inlined_kernel
+def blend_row(
+    before: Any,
+    middle: Any,
+    after: Any,
+    before_weight: Any,
+    middle_weight: Any,
+    after_weight: Any,
+    out_sum: Any,
+) -> None:
+    """Add the weighted sum of three compact rows to a row.
+
+    Parameters
+    ----------
+    before, middle, after : (96,) float32
+    before_weight, middle_weight, after_weight : float32
     out_sum : (96,) float32
         In and out.
     """
     for lane in range(ROW):
-        out_sum[lane] += weight * key[lane] + next_weight * next_key[lane]
+        out_sum[lane] += (
+            before_weight * before[lane] + middle_weight * middle[lane] + after_weight * after[lane]
+        )
 
 
 @inlined_kernel
@@ -150,20 +191,21 @@ def sum_examples(
         place = course * apex
         if course > APEX:
             place = apex + (course - APEX) * (keys.key_count[clip] - 1 - apex)
-        index = min(int(place), keys.key_count[clip] - 2)
-        before = keys.first_key[clip] + index
-        after_share = own * (place - index)
-        before_share = own - after_share
+        index, before, middle, after = key_shares(place, keys.key_count[clip])
+        key = keys.first_key[clip] + index
+        before, middle, after = own * before, own * middle, own * after
         blend_row(
-            keys.rotation[before],
-            keys.rotation[before + 1],
-            np.float32(before_share),
-            np.float32(after_share),
+            keys.rotation[key],
+            keys.rotation[key + 1],
+            keys.rotation[key + 2],
+            np.float32(before),
+            np.float32(middle),
+            np.float32(after),
             row,
         )
-        x += before_share * keys.pelvis[before, 0] + after_share * keys.pelvis[before + 1, 0]
-        y += before_share * keys.pelvis[before, 1] + after_share * keys.pelvis[before + 1, 1]
-        z += before_share * keys.pelvis[before, 2] + after_share * keys.pelvis[before + 1, 2]
+        x += before * keys.pelvis[key, 0] + middle * keys.pelvis[key + 1, 0] + after * keys.pelvis[key + 2, 0]
+        y += before * keys.pelvis[key, 1] + middle * keys.pelvis[key + 1, 1] + after * keys.pelvis[key + 2, 1]
+        z += before * keys.pelvis[key, 2] + middle * keys.pelvis[key + 1, 2] + after * keys.pelvis[key + 2, 2]
         total += own
     return (x, y, z), total
 
@@ -390,7 +432,7 @@ def blend_body(
     own : tuple of float
         Shares of the right and left hand's examples.
     rows : (SCRATCH_ROW,) float32
-        Scratch, see `blend_shares`.
+        Scratch, see `blend_shares`; in: compact row of the pose.
     pose : (256,) float32
         In and out: pose row.
     pelvis : (3,) float32
@@ -400,7 +442,6 @@ def blend_body(
     -----
     All other arguments are those of `reach_character`.
     """
-    read_joints(keys, pose, rows[2 * ROW : 3 * ROW])
     below = (float(pelvis[0]), float(pelvis[1]), float(pelvis[2]))
     moved = blend_shares(character, walking_share, keys, own, state, below, rows)
     write_joints(keys, rows[ROW : 2 * ROW], rows[3 * ROW : SCRATCH_ROW], pose)

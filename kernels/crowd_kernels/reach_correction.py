@@ -225,7 +225,7 @@ def keep_corrections(
     slowest: float,
     task: Any,
     bound: Any,
-    rests: Any,
+    waited: Any,
     solution: Any,
     active: Any,
     pose_rotation: Any,
@@ -247,13 +247,14 @@ def keep_corrections(
     most : float
         Largest change of a correction's change: half the angle, rad.
     slowest : float
-        Half the angle that joints of people who rest turn by in a step, or else not at all, rad.
+        Half the angle that joints turn by in a step after a person has waited for 1 s, or else not at all,
+        rad; in proportion to that time.
     task : (N, >= E) uint8
         What is asked of each effector, 0 for nothing.
     bound : (N, >= E) float32
         See `start_solves`: joints that are not bound turn as solved, as those of a hand that is nearly back.
-    rests : (N,) uint8
-        1 for people who only wait with both hands, one of them far from its goal: others go on as solved.
+    waited : (N,) float64
+        For how long people have only waited with both hands, one of them far from its goal, s.
     solution : (N, L) float32
         Pose rows that the solves left, unit quaternions.
     active : (A,) int32
@@ -283,8 +284,8 @@ def keep_corrections(
             row = out_correction[character]
             change = out_change[character]
             # Solves of two hands that cannot both be where they should creep on for long.
-            is_still = rests[character] != 0 and is_slower(
-                tree, solution[character], out_last[character], np.float32(slowest)
+            is_still = waited[character] > 0.0 and is_slower(
+                tree, solution[character], out_last[character], np.float32(slowest * waited[character])
             )
             is_eased = is_still
             for k in range(tree.joint.shape[0]):

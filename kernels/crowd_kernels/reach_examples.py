@@ -1,5 +1,6 @@
 """Which examples a reaching hand blends: those of its target, taken up as gradually as it goes there."""
 
+import math
 from typing import Any
 
 from crowd_kernels._jit import inlined_kernel
@@ -327,7 +328,12 @@ def follow_weights(
     -----
     **Source:** `easing.settle`, which is linear in place, velocity and acceleration.
     """
-    time = max(state.time_left[character, arm], limits.example_time)
+    change = 0.0
+    for slot in range(state.example_count[character, arm]):
+        change += abs(state.example_wanted[character, arm, slot] - state.example_weight[character, arm, slot])
+    # Where much is to change, as from one tetrahedron of examples to another, joints turn far.
+    time = limits.example_time * math.sqrt(max(0.5 * change / limits.weight_change, 1.0))
+    time = max(time, state.time_left[character, arm])
     own, per_rate, per_bend = settle_shares(time, dt)
     total = 0.0
     there = 0.0

@@ -21,6 +21,7 @@ from crowd_kernels.quaternion import (
 from crowd_kernels.reach_blend import JOINTS, ROW, ReachKeys, blend_apex, unit_row
 from crowd_kernels.reach_place import place_apex, place_point
 from crowd_kernels.reach_state import (
+    APEX,
     ReachLimits,
     ReachState,
     quaternion_of,
@@ -28,12 +29,13 @@ from crowd_kernels.reach_state import (
     set_vector,
     vector_of,
 )
+from crowd_kernels.reach_time import largest_turn, time_to_turn
 from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 
-PEAK = 5.7735
-"""Largest acceleration of minimum-jerk motion, over its way and its time squared."""
 TURNING_ROUND = 0.7
 """Further time for a hand that glides already, over that since its glide began or until it ends."""
+ON_THE_WAY = 0.4
+"""Share of the acceleration of joints that glides have before the apex, where examples have their own."""
 SPARED = 0.65
 """What hopeless ways are shorter by than the longest that there is, over `longest`, see `shortened`."""
 
@@ -62,21 +64,6 @@ def shortened(vector: Vector, longest: float) -> Vector:
     square = beyond * beyond
     risen = beyond - square * square * (2.5 - beyond * (3.0 - beyond))
     return scaled(vector, longest * (1.0 + risen - SPARED * minimum_jerk(beyond)) / length)
-
-
-@inlined_kernel
-def largest_turn(row: Any, other: Any) -> float:
-    """Find the largest angle between joints of two compact rows (96,), as blends go from one to the other."""
-    least = 1.0
-    for k in range(JOINTS):
-        cosine = (
-            row[k] * other[k]
-            + row[JOINTS + k] * other[JOINTS + k]
-            + row[2 * JOINTS + k] * other[2 * JOINTS + k]
-            + row[3 * JOINTS + k] * other[3 * JOINTS + k]
-        )
-        least = min(least, float(cosine))
-    return 2.0 * math.acos(max(least, -1.0))
 
 
 @inlined_kernel
@@ -206,9 +193,6 @@ def plan_glide(
     rows : (192,) float32
         Scratch.
 
-    Notes
-    -----
-    **Source:** the acceleration of minimum-jerk motion; Flash, Hogan, 1985.
     """
     now, then = rows[:ROW], rows[ROW : 2 * ROW]
     body, body_turned = blend_apex(
@@ -221,8 +205,8 @@ def plan_glide(
     end, end_turned = place_point(character, arm, scale, end_body, end_body_turned, keys, state, then, JOINTS)
     turn = largest_turn(now, then)
     offset = vector_of(state.offset, character, arm)
-    _, bend = bulge_now(character, arm, state)
-    acceleration = add(vector_of(state.lag_acceleration, character, arm), bend)
+    _, bulging = bulge_now(character, arm, state)
+    acceleration = add(vector_of(state.lag_acceleration, character, arm), bulging)
     set_vector(state.lag_acceleration, character, arm, acceleration)
     aside = multiply(conjugate(end_turned), turned)
     goal = multiply(
@@ -239,7 +223,8 @@ def plan_glide(
     time = limits.least_time + limits.time_per_metre * way
     if shared > 0.0:
         time += limits.time_shared * max(norm(offset), norm(wish))
-    time = max(time, math.sqrt(PEAK * turn / limits.turn_acceleration), limits.far_turn_time * turn * turn)
+    bend = limits.turn_acceleration * (1.0 if state.course[character, arm] == APEX else ON_THE_WAY)
+    time = max(time, time_to_turn(turn, bend), limits.far_turn_time * turn * turn)
     if state.rotation_share[character, arm] > 0.0:
         turning = multiply(goal, conjugate(rotation))
         time = max(time, limits.time_per_radian * norm(rotation_vector(turning)))

@@ -9,6 +9,7 @@ from crowd_kernels._jit import inlined_kernel, kernel
 from crowd_kernels.easing import settle_vector
 from crowd_kernels.quaternion import (
     Quaternion,
+    angular_velocity,
     conjugate,
     from_rotation_vector,
     from_yaw,
@@ -16,6 +17,7 @@ from crowd_kernels.quaternion import (
     normalized,
     rotate,
     rotation_vector,
+    rotation_vector_rate,
 )
 from crowd_kernels.reach_course import paced
 from crowd_kernels.reach_state import (
@@ -34,6 +36,8 @@ from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 JUMPED = 0.8
 """A rotation asked for that is farther away than this has jumped, and the hand is on its way again; one that
 turns at up to 4 rad/s is followed closer, rad."""
+AFTER_JUMP = 0.25
+"""Share of the largest acceleration that hands follow in the step after their target has jumped."""
 LEAST_SHARE = 0.01
 """Share of a rotation that stays until a hand has glided to its target; hardly anything shows of it."""
 
@@ -72,10 +76,11 @@ def see_target(
     seen = vector_of(state.seen, character, arm)
     expected = add(seen, scaled(vector_of(state.seen_velocity, character, arm), dt))
     velocity = scaled(subtract(target, seen), 1.0 / dt)
-    has_jumped = norm(subtract(target, expected)) > limits.acceleration * dt * dt
     left = state.time_left[character, arm]
-    # One that leaves its path in two steps running has got another velocity.
+    # One that has just jumped has got another velocity, which the glide must know as well.
     goes_on = left > 0.0 and state.plan_time[character, arm] - left < 1.5 * dt
+    largest = limits.acceleration * (AFTER_JUMP if goes_on else 1.0)
+    has_jumped = norm(subtract(target, expected)) > largest * dt * dt
     if has_jumped and (not goes_on or norm(velocity) > limits.target_speed):
         velocity = (0.0, 0.0, 0.0)
     set_vector(state.seen, character, arm, target)
@@ -109,16 +114,16 @@ def follow_rotation(
         set_vector(state.turn_velocity, character, arm, (0.0, 0.0, 0.0))
         set_vector(state.turn_acceleration, character, arm, (0.0, 0.0, 0.0))
         return
-    left, velocity, acceleration = settle_vector(
+    left, rate, acceleration = settle_vector(
         left,
-        vector_of(state.turn_velocity, character, arm),
+        rotation_vector_rate(left, vector_of(state.turn_velocity, character, arm)),
         vector_of(state.turn_acceleration, character, arm),
         time,
         dt,
     )
     rotation = normalized(multiply(from_rotation_vector(left), turned))
     set_quaternion(state.rotation, character, arm, rotation)
-    set_vector(state.turn_velocity, character, arm, velocity)
+    set_vector(state.turn_velocity, character, arm, angular_velocity(left, rate))
     set_vector(state.turn_acceleration, character, arm, acceleration)
 
 

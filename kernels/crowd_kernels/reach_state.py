@@ -45,6 +45,8 @@ class ReachLimits(NamedTuple):
     """Change of the course's rate when a reach turns back or slows down, over the square of that rate."""
     lead: float
     """Share of the way to the apex in which the examples take over the pose."""
+    lead_acceleration: float
+    """Largest angular acceleration with which joints turn to theirs from far off, rad/s^2."""
     rotation_rate: float
     """Largest rate with which a rotation that is asked for on the way comes and goes, 1/s."""
     farthest: float
@@ -53,10 +55,12 @@ class ReachLimits(NamedTuple):
     """Rate with which what could not be had is made up for, 1/s."""
     example_time: float
     """Time in which the examples' weights follow those of a look-up, s."""
+    weight_change: float
+    """Change of all weights together from which on they follow more slowly, 0 to 1, > 0."""
 
 
 class ReachState(NamedTuple):
-    """What changes: fields of the state, (N, 2, ...) for right and left hand."""
+    """What changes: fields of the state, (N, 2, ...) for right and left hand unless stated otherwise."""
 
     stage: npt.NDArray[np.uint8]
     status: npt.NDArray[np.uint8]
@@ -74,7 +78,11 @@ class ReachState(NamedTuple):
     hold_left: npt.NDArray[np.float64]
     course: npt.NDArray[np.float64]
     course_rate: npt.NDArray[np.float64]
+    waited: npt.NDArray[np.float64]
+    """(N,) For how long both hands have waited of people who stand, one of them far from its goal, s."""
     weight: npt.NDArray[np.float64]
+    lead_time: npt.NDArray[np.float64]
+    """(N, 2) Least time between rest and goal, s."""
     seen: npt.NDArray[np.float64]
     seen_velocity: npt.NDArray[np.float64]
     offset: npt.NDArray[np.float64]

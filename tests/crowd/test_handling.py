@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crowd.controllers.carrying import CARRYING, FREE, PLACING, WAITING
 from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
 from crowd.errors import SettingsError
 from crowd.motion.rotation import conjugate, rotate
 from crowd.scenario.load import scenario_from
 from crowd.scenario.source import ScenarioSource
 from crowd.simulation import Simulation
+from crowd.state import CARRYING, FREE, PLACING, WAITING
 from crowd_kernels.reach_state import MOVING, NONE, OUT_OF_REACH, REACHED, REFUSED
 
 THINGS = [

@@ -16,6 +16,7 @@ from crowd.bench.reach import (
     send_on,
 )
 from crowd.bench.reachers import Reachers, angular_motion, random_targets, random_turns
+from crowd.motion.easing import minimum_jerk
 from crowd.motion.rotation import conjugate, from_vector, multiply
 from crowd_kernels.reach_state import HOLD, MOVING, OUT_OF_REACH, REACHED
 
@@ -65,6 +66,22 @@ def test_nothing_jumps_when_the_second_hand_comes_and_goes_while_the_first_one_h
     shown += frames(reachers, 110)
     assert not simulation.state.reach_stage.any()
     assert angular_motion(np.array(shown), simulation.dt)[1] < allowed(reachers)
+
+
+@pytest.mark.parametrize("hands", [(0,), (0, 1)])
+def test_nothing_jumps_when_people_set_off_and_stop_while_their_hands_reach(reachers, hands, rng):
+    """Examples of the whole body give way to those of the upper one, and come back."""
+    state, shown = reachers.simulation.state, []
+    begin = rng.uniform(0, 60, PEOPLE)
+    for hand in hands:
+        reachers.reach(hand, before_the_body(reachers, hand, rng))
+    for frame in range(300):
+        walking = minimum_jerk((frame - begin) / 40) - minimum_jerk((frame - begin - 120) / 40)
+        # Those who only walk are posed by a layer that is not here.
+        state.locomotion_weight[:] = 0.999 * walking
+        shown += frames(reachers, 1)
+    assert (state.reach_status[:, hands] == REACHED).all()
+    assert angular_motion(np.array(shown), reachers.simulation.dt)[1] < allowed(reachers)
 
 
 def sent_on(reachers, hand, has_rotation, rng):

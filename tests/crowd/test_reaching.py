@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from crowd.bench.reachers import angular_motion
 from crowd.blending.reach_space import (
     BODY_RADIUS,
     LARGEST_GAP,
@@ -17,6 +18,7 @@ from crowd.motion.mirror import mirrored
 from crowd.motion.procedural.reach_pose import centre_of_mass, place_joints
 from crowd.motion.procedural.reaching import seated_reaches, standing_reaches
 from crowd.motion.rotation import rotate
+from tests.oracles import reach as oracle
 
 SKELETON = build_skeleton()
 RIGHT = [clip for clip in standing_reaches() if clip.reach.side == "right"]
@@ -137,3 +139,34 @@ def test_blends_come_near_to_what_is_asked(space, rng):
         hand = hand_position(SKELETON, space.examples[part].side, rotation, pelvis)
         error = np.linalg.norm(hand - asked, axis=1)
         assert np.percentile(error, 90) < 0.04
+
+
+def played(space, number, rate):
+    """Rotations (F, J, 4) and pelvis (F, 3) of an example as it is blended, `rate` times a second."""
+    keys = space.keys
+    course = np.linspace(0.0, 2.0, round(keys.end_time[number] * rate) + 1)
+    time = np.linspace(0.0, keys.end_time[number], len(course))
+    apex, end = keys.apex_time[number], keys.end_time[number]
+    course = np.where(time <= apex, time / apex, 1.0 + (time - apex) / (end - apex))
+    poses = [oracle.blend(keys, {number: 1.0}, at) for at in course]
+    return np.array([pose for pose, _ in poses]), np.array([pelvis for _, pelvis in poses])
+
+
+@pytest.mark.parametrize("number", [0, 7, 19])
+def test_curves_go_through_the_frames_of_examples(space, number):
+    clip = space.examples[0].clips[number]
+    rotation, pelvis = played(space, number, clip.frame_rate)
+    frames = clip.rotation_local[:, space.keys.joint]
+    cosine = np.abs((rotation * frames).sum(axis=2)).min()
+    assert np.degrees(2.0 * np.arccos(min(cosine, 1.0))) < 0.5
+    assert np.abs(pelvis - clip.pelvis_position_root).max() < 1e-3
+
+
+@pytest.mark.parametrize("rate", [60, 77, 240])
+@pytest.mark.parametrize("number", [0, 7, 19])
+def test_examples_do_not_accelerate_more_however_often_they_are_drawn(space, number, rate):
+    clip = space.examples[0].clips[number]
+    frames = clip.rotation_local[:, space.keys.joint].astype(np.float64)
+    _, wanted = angular_motion(frames[:, None], 1.0 / clip.frame_rate)
+    _, found = angular_motion(played(space, number, rate)[0][:, None], 1.0 / rate)
+    assert found < 1.1 * wanted

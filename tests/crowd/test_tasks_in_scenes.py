@@ -7,10 +7,10 @@ import pytest
 
 import crowd
 from crowd.checkpoint import state_arrays
-from crowd.controllers.carrying import CARRYING, PLACING
 from crowd.controllers.grab import CLOSING, HOLDING, OPEN
 from crowd.errors import MotionError
 from crowd.motion.procedural import built_in_library
+from crowd.state import CARRYING, PLACING
 from crowd.tasks.events import EventKind
 
 ROOM = """

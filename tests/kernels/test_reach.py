@@ -11,10 +11,12 @@ from crowd.bench.reachers import Reachers
 from crowd.controllers.reach import REACH_LIMITS
 from crowd.motion.rotation import multiply
 from crowd_kernels.easing import hump, settle
-from crowd_kernels.reach import reach_crowd
-from crowd_kernels.reach_aim import carried_hand
+from crowd_kernels.reach import is_waiting, reach_crowd
+from crowd_kernels.reach_aim import turn_trunk
+from crowd_kernels.reach_blend import JOINTS, ROW, key_shares, read_joints
 from crowd_kernels.reach_correction import LANES as CORRECTED
 from crowd_kernels.reach_goal import is_inside_body
+from crowd_kernels.reach_place import local_rotation, place_hand
 from crowd_kernels.reach_state import (
     HOLD,
     MOVE,
@@ -27,6 +29,7 @@ from crowd_kernels.reach_state import (
     ReachState,
 )
 from crowd_kernels.reach_status import reach_status_crowd
+from tests.kernels.reach_states import state_of
 from tests.oracles import reach as oracle
 from tests.oracles import reach_space as space_oracle
 
@@ -47,6 +50,23 @@ def test_settling_step_by_step_comes_to_rest_in_time(place, velocity, accelerati
     for step in range(steps):
         motion = settle(*motion, (steps - step) * dt, dt)
     assert motion == (0.0, 0.0, 0.0)
+
+
+@given(place=st.floats(0.0, 11.0), count=st.integers(3, 12))
+def test_shares_of_keys_are_those_of_quadratic_splines(place, count):
+    place = min(place, count - 1.0)
+    first, *shares = key_shares(place, count)
+    assert sum(shares) == pytest.approx(1.0)
+    wanted = oracle.spline_shares(place, count - 1)
+    assert sorted(wanted) == [first, first + 1, first + 2]
+    np.testing.assert_allclose(shares, list(wanted.values()), atol=1e-9)
+
+
+@given(line=st.tuples(number, number), place=st.floats(0.0, 8.0))
+def test_keys_on_a_straight_line_give_that_line_to_its_very_ends(line, place):
+    first, *shares = key_shares(place, 9)
+    found = sum(share * (line[0] + line[1] * (first + k)) for k, share in enumerate(shares))
+    assert found == pytest.approx(line[0] + line[1] * place, abs=1e-9)
 
 
 def test_hump_rises_to_one_and_is_smooth_at_its_ends():
@@ -103,7 +123,6 @@ def test_reach_matches_oracle(reachers, hand, course, rng):
         reach._number, reach._real, reach._rows, state.reach_correction,
         state.reach_correction_change, state.reach_last_rotation,
         pose, pelvis, task, out, np.zeros((24, 2, 4), np.float32), *np.zeros((2, 24, 2), np.float32),
-        np.zeros(24, np.uint8),
     )  # fmt: skip
     first = [0, len(space.examples[0].clips)][hand]
     for row in range(24):
@@ -126,7 +145,7 @@ def test_reach_matches_oracle(reachers, hand, course, rng):
 
 
 @pytest.mark.parametrize("arm", [0, 1])
-def test_a_carried_hand_hangs_on_the_corrected_trunk(reachers, arm, rng):
+def test_a_hand_hangs_on_the_corrected_trunk(reachers, arm, rng):
     simulation, keys = reachers.simulation, reachers.space.keys
     tree = simulation.reach._tree
     np.testing.assert_array_equal(tree.joint[keys.chain_place], keys.joint[keys.chain])
@@ -139,10 +158,36 @@ def test_a_carried_hand_hangs_on_the_corrected_trunk(reachers, arm, rng):
         x, y, z = (correction + change)[at::CORRECTED].astype(float)
         local[compact] = multiply([np.sqrt(1 - x * x - y * y - z * z), x, y, z], local[compact])
     scale = simulation.model.people.segment_scale[0]
-    place, turned = carried_hand(keys, arm, scale, (0.1, 0.9, 0.0), pose, correction, change)
+    row = np.zeros(ROW, np.float32)
+    read_joints(keys, pose, row)
+    turn_trunk(keys, correction, change, row)
+    first = local_rotation(row, 0, JOINTS)
+    place, turned = place_hand(keys, arm, scale, (0.1, 0.9, 0.0), first, row, JOINTS)
     wanted, frame = oracle.place_hand(keys, arm, scale.astype(float), (0.1, 0.9, 0.0), local)
     np.testing.assert_allclose(place, wanted, atol=1e-6)
     np.testing.assert_allclose(abs(np.dot(turned, frame)), 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("stage", "status", "missing", "speed", "waits"),
+    [
+        ((HOLD, HOLD), (OUT_OF_REACH, REACHED), (0.05, 0.0), 0.0, True),
+        ((HOLD, HOLD), (REACHED, OUT_OF_REACH), (0.0, 0.05), 0.0, True),
+        ((HOLD, MOVE), (OUT_OF_REACH, MOVING), (0.05, 0.0), 0.0, False),
+        ((HOLD, HOLD), (REACHED, REACHED), (0.0, 0.0), 0.0, False),
+        ((HOLD, HOLD), (OUT_OF_REACH, REACHED), (0.001, 0.0), 0.0, False),
+        ((HOLD, HOLD), (OUT_OF_REACH, REACHED), (0.05, 0.0), 0.1, False),
+        ((HOLD, NONE), (OUT_OF_REACH, 0), (0.05, 0.0), 0.0, False),
+    ],
+)
+def test_people_wait_with_both_hands_where_nothing_moves_and_one_is_far_off(
+    stage, status, missing, speed, waits
+):
+    state = state_of(0, stage=stage[0], status=status[0], missing_place=(missing[0], 0.0, 0.0))
+    state.stage[0, 1], state.status[0, 1] = stage[1], status[1]
+    state.missing_place[0, 1, 2] = missing[1]
+    state.seen_velocity[0, 1, 0] = speed
+    assert is_waiting(0, state) == waits
 
 
 def status_after(stage, status, distance, angle, has_rotation=False, hold=math.inf):

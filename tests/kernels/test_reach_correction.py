@@ -18,8 +18,8 @@ ACTIVE = np.array([4, 1, 2, 5], np.int32)
 INACTIVE = [0, 3]
 BOTH = np.full((COUNT, 2), 1, np.uint8)
 WHOLE = np.ones((COUNT, 2), np.float32)
-RESTS = np.ones(COUNT, np.uint8)
-RESTS[ACTIVE[1]] = 0
+WAITED = np.ones(COUNT)
+WAITED[ACTIVE[1]] = 0.0
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -40,12 +40,12 @@ def vectors(row):
     return row.reshape(3, LANES)[:, : len(TREE.joint)].T.astype(float)
 
 
-def keep(solution, pose, correction, last, change=None, most=10.0, slowest=0.0, bound=WHOLE):
+def keep(solution, pose, correction, last, change=None, most=10.0, slowest=0.0, bound=WHOLE, waited=WAITED):
     """Keep corrections; gives the distances of hands, 0 where joints are as solved."""
     change = np.zeros_like(correction) if change is None else change
     distance = np.zeros((COUNT, 2), np.float32)
     keep_corrections(
-        TREE, most, slowest, BOTH, bound, RESTS, solution, ACTIVE, pose, correction, change, last, distance
+        TREE, most, slowest, BOTH, bound, waited, solution, ACTIVE, pose, correction, change, last, distance
     )
     return distance
 
@@ -150,7 +150,8 @@ def test_corrections_change_their_speed_gradually_and_joints_stay_within_limits(
     for i in ACTIVE:
         for k in np.flatnonzero(turning):
             place = vectors(expected[i])[k]
-            wanted = oracle.eased(TREE, k, local(solution[i])[k], local(before[i])[k], place, most)
+            solved, blended = local(solution[i])[k], local(before[i])[k]
+            wanted = oracle.eased(TREE, k, solved, blended, place, most)
             assert abs(wanted @ local(pose[i])[k]) > 1 - 1e-5
             if not TREE.is_limited[k]:
                 assert np.linalg.norm(vectors(correction[i])[k] - place) < most + 1e-5
@@ -188,6 +189,22 @@ def test_people_who_only_creep_rest_where_both_hands_wait(rng):
     for person in (moving, ACTIVE[1]):
         np.testing.assert_array_equal(local(pose[person])[turning], local(solution[person])[turning])
         assert not distance[person].any()
+
+
+def test_the_longer_people_wait_the_faster_joints_come_to_rest(rng):
+    pose = poses(rng)
+    last, correction = near(pose, 0.3, rng), np.zeros((COUNT, 3 * LANES), np.float32)
+    solution, before = near(last, 0.02, rng), last.copy()
+    waited = np.array([0.0, 1.0, 8.0, 0.0, 4.0, 2.0])
+    keep(solution, pose, correction, last, slowest=0.002, waited=waited)
+    turning = TREE.weight > 0
+    for person in ACTIVE:
+        half = np.linalg.norm(local(solution[person]) - local(before[person]), axis=1)[turning].max()
+        rests = half < 0.002 * waited[person]
+        wanted = before if rests else solution
+        np.testing.assert_array_equal(local(pose[person])[turning], local(wanted[person])[turning])
+    assert not np.array_equal(pose[2], solution[2])
+    assert np.array_equal(local(pose[1])[turning], local(solution[1])[turning])
 
 
 def test_joints_that_are_not_bound_turn_as_solved(rng):

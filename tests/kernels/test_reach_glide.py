@@ -9,32 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crowd.controllers.reach import REACH_LIMITS
-from crowd_kernels.reach_blend import JOINTS
 from crowd_kernels.reach_course import paced
-from crowd_kernels.reach_examples import LEAST_WEIGHT, SLOTS, follow_weights
-from crowd_kernels.reach_glide import away_from_body, glide, largest_turn, shortened
-from crowd_kernels.reach_state import ReachState
+from crowd_kernels.reach_examples import LEAST_WEIGHT, follow_weights
+from crowd_kernels.reach_glide import away_from_body, glide, shortened
+from tests.kernels.reach_states import state_of
 from tests.oracles import reach as oracle
 
 DT = 1 / 60
 STILL = (0.0, 0.0, 0.0)
 length = st.floats(0.0, 1.5)
 metre = st.floats(-0.4, 0.4)
-
-
-def state_of(**known):
-    """The state of one person's hands: zeros, but for what is given for the right one."""
-    shape = {"example": (SLOTS,), "rotation": (4,), "glide_turn": (4,), "target_rotation_world": (4,)}
-    flat = {"time_left", "plan_time", "course", "example_count", "stage", "status", "weight"}
-    arrays = {}
-    for name in ReachState._fields:
-        last = shape.get(name, (SLOTS,) if name.startswith("example_") else (3,))
-        last = () if name in flat else last
-        kind = np.int32 if name in ("example", "example_count") else float
-        arrays[name] = np.zeros((1, 2, *last), kind)
-    for name, value in known.items():
-        arrays[name][0, 0] = value
-    return ReachState(**arrays)
 
 
 @given(size=length, longest=st.floats(0.05, 0.5))
@@ -52,16 +36,6 @@ def test_ways_within_reach_are_not_shortened_and_no_speed_jumps_where_they_begin
     assert np.abs(np.diff(slope)).max() < 2e-2
     assert ways.max() < 1.2 * 0.13
     assert ways[-1] == pytest.approx(0.85 * 0.13)
-
-
-def test_the_largest_turn_is_that_of_the_joint_that_turns_most(rng):
-    for _ in range(50):
-        first, second = rng.normal(size=(2, JOINTS, 4)) * 0.3 + (1.0, 0.0, 0.0, 0.0)
-        first /= np.linalg.norm(first, axis=1, keepdims=True)
-        second /= np.linalg.norm(second, axis=1, keepdims=True)
-        wanted = 2.0 * np.arccos((first * second).sum(axis=1).min())
-        rows = [rotation.T.ravel().astype(np.float32) for rotation in (first, second)]
-        assert largest_turn(*rows) == pytest.approx(wanted, abs=2e-3)
 
 
 @given(middle=st.tuples(metre, metre, metre), begin=st.tuples(metre, metre, metre))
@@ -87,7 +61,7 @@ def test_a_glide_goes_on_from_where_the_hand_is_and_ends_in_time_at_what_is_wish
 ):
     wish, time = (0.05, -0.02, 0.01), steps * DT
     state = state_of(
-        offset=offset, offset_velocity=velocity, time_left=time, plan_time=time, bulge=(0.0, 0.0, 0.05)
+        0, offset=offset, offset_velocity=velocity, time_left=time, plan_time=time, bulge=(0.0, 0.0, 0.05)
     )
     places = [offset]
     for _ in range(steps + 1):
@@ -108,7 +82,7 @@ def test_a_glide_goes_on_from_where_the_hand_is_and_ends_in_time_at_what_is_wish
 def test_a_glide_to_what_moves_begins_as_fast_as_the_hand_was(offset, velocity, speed):
     """As where the other hand moves the trunk, against which the offset moves, while a target jumps."""
     time, wish = 1.5, np.array([0.05, -0.02, 0.01])
-    state = state_of(offset=offset, offset_velocity=velocity, time_left=time, plan_time=time)
+    state = state_of(0, offset=offset, offset_velocity=velocity, time_left=time, plan_time=time)
     places = [np.array(offset)]
     step = tuple(np.multiply(speed, DT))
     for frame in range(4):
@@ -122,7 +96,7 @@ def test_a_glide_to_what_moves_begins_as_fast_as_the_hand_was(offset, velocity, 
 
 
 def test_a_hand_that_does_not_glide_is_where_it_is_wished_and_its_velocity_is_noted():
-    state = state_of(offset=(0.1, 0.0, 0.0))
+    state = state_of(0, offset=(0.1, 0.0, 0.0))
     assert glide(0, 0, (0.1, 0.02, 0.0), STILL, 2.0, False, DT, state) == (0.1, 0.02, 0.0)
     np.testing.assert_allclose(state.offset_velocity[0, 0], (0.0, 0.02 / DT, 0.0))
     glide(0, 0, (0.5, 0.0, 0.0), STILL, 2.0, True, DT, state)
@@ -143,7 +117,7 @@ KEYS = Times(np.array([0.8, 1.0, 0.6]), np.array([1.8, 2.2, 1.5]))
 def test_weights_follow_what_is_wanted_as_the_oracle_says(wanted, time):
     wanted = np.array(wanted) / np.sum(wanted)
     weight, rate, bend = np.array([1.0, 0.0, 0.0]), np.array([-1.0, 1.0, 0.0]), np.array([2.0, 0.0, -2.0])
-    state = state_of(time_left=time, example_count=3)
+    state = state_of(0, time_left=time, example_count=3)
     for name, value in (
         ("example_wanted", wanted),
         ("example_weight", weight),
@@ -153,7 +127,7 @@ def test_weights_follow_what_is_wanted_as_the_oracle_says(wanted, time):
         getattr(state, name)[0, 0, :3] = value
     state.example[0, 0, :3] = (0, 1, 2)
     there, back = follow_weights(0, 0, REACH_LIMITS, KEYS, DT, state)
-    horizon = max(time, REACH_LIMITS.example_time)
+    horizon = max(time, oracle.time_of_weights(wanted, weight, REACH_LIMITS))
     after = [
         oracle.settle(weight[k] - wanted[k], rate[k], bend[k], horizon, DT)[0] + wanted[k] for k in range(3)
     ]
@@ -164,7 +138,7 @@ def test_weights_follow_what_is_wanted_as_the_oracle_says(wanted, time):
 
 
 def test_weights_that_have_faded_leave_their_slots():
-    state = state_of(example_count=2)
+    state = state_of(0, example_count=2)
     state.example_wanted[0, 0, 0] = state.example_weight[0, 0, 0] = 1.0
     state.example[0, 0, :2] = (0, 1)
     state.example_weight[0, 0, 1] = 0.5 * LEAST_WEIGHT

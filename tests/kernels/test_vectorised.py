@@ -81,7 +81,7 @@ ARITHMETIC_LEAVES |= {
 }
 ARITHMETIC_LEAVES |= {
     hand_pose.turn_fingers_row: (ROW, ROW, ROW),
-    reach_blend.blend_row: (ROW, ROW, NUMBER, NUMBER, ROW),
+    reach_blend.blend_row: (ROW, ROW, ROW, *[NUMBER] * 3, ROW),
     reach_blend.unit_row: (ROW,),
     reach_blend.share_row: (ROW, *[NUMBER] * 4, ROW),
     reach_blend.add_group_row: (ROW, ROW, ROW, ROW),

@@ -1,6 +1,7 @@
 """Slow twins of reaching: minimum-jerk motion by its equations, and the blended pose of one hand."""
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 from crowd.motion.rotation import multiply, rotate
 
@@ -27,6 +28,18 @@ def minimum_jerk(u):
     return u**3 * (u * (6 * u - 15) + 10)
 
 
+def spline_shares(place, last):
+    """Shares of the keys {key: share} by SciPy's quadratic B-splines, whose end pieces go on to the ends."""
+    middle = np.clip(np.floor(place + 0.5), 1, last - 1)
+    piece = BSpline.basis_element(np.arange(4) - 1.5)
+    shares = {}
+    for key in range(int(middle) - 1, int(middle) + 2):
+        # The polynomial that the piece is around the middle, found at three places of it.
+        near = middle + np.array([-0.4, 0.0, 0.4])
+        shares[key] = np.polyval(np.polyfit(near - middle, piece(near - key), 2), place - middle)
+    return shares
+
+
 def blend(keys, weights, course):
     """Rotations (J, 4) and pelvis (3,) of examples, {number: weight}, at a course."""
     rotation, pelvis = np.zeros((4, 24)), np.zeros(3)
@@ -37,9 +50,7 @@ def blend(keys, weights, course):
             if course <= 1
             else keys.apex[clip] + (course - 1) * (last - keys.apex[clip])
         )
-        before = min(int(place), last - 1)
-        share = place - before
-        for key, own in ((before, 1 - share), (before + 1, share)):
+        for key, own in spline_shares(place, last).items():
             row = keys.first_key[clip] + key
             rotation += weight * own * keys.rotation[row].astype(float).reshape(4, 24)
             pelvis += weight * own * keys.pelvis[row]
@@ -93,3 +104,20 @@ def shortened(size, longest):
     beyond = np.linspace(0.0, min(size / longest - 1.0, 1.0), 4001)
     risen = np.trapezoid(1.0 - minimum_jerk(beyond), beyond)
     return longest * (1.0 + risen - 0.65 * minimum_jerk(beyond[-1]))
+
+
+def time_of_weights(wanted, weight, limits):
+    """Time in which weights follow wanted ones: longer by the root of how far more than usual they differ."""
+    change = 0.5 * np.abs(np.subtract(wanted, weight)).sum()
+    return limits.example_time * np.sqrt(max(change / limits.weight_change, 1.0))
+
+
+def turn_to_examples(keys, weights, course, live, arm, upper, walking):
+    """Largest turn of joints from rotations (J, 4) to examples at a course, as far as these count, rad."""
+    rotation, _ = blend(keys, weights, course)
+    cosine = np.abs((rotation * live).sum(axis=1))
+    share = np.ones(len(cosine))
+    group = keys.group.reshape(4, 24)[:, : len(share)]
+    share[group[0] > 0] = 1.0 - upper
+    share[group[3 - arm] > 0] = 1.0 - walking
+    return (share * 2.0 * np.arccos(np.minimum(cosine, 1.0))).max()
