@@ -15,7 +15,7 @@ from crowd.errors import SettingsError, describe
 from crowd.motion.clip import ClipKind
 from crowd.people import HANDING_HEIGHT
 from crowd.scenario.task_table import TaskTable
-from crowd.state import FREE
+from crowd.state import CarryStage
 from crowd.tasks.execution import encode_tasks
 
 if TYPE_CHECKING:
@@ -456,7 +456,7 @@ class Commands:
     def _lets_reach(self, rows: npt.NDArray[np.int32], side: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
         """Whose hands can reach by themselves; those that hold something with the other hand are refused."""
         simulation = self._simulation
-        is_tied = simulation.state.carry_stage[rows] != FREE
+        is_tied = simulation.state.carry_stage[rows] != CarryStage.FREE
         simulation.grab.refuse(simulation.state, rows[is_tied], side[is_tied], GrabStatus.TIED)
         return np.asarray(~is_tied)
 

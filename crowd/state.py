@@ -5,6 +5,7 @@ Rows are slots; a slot without a person has ``is_active`` False and its other va
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,20 @@ LongArray = npt.NDArray[np.int64]
 ByteArray = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
 
-FREE, PLACING, CARRYING, STOPPED, WAITING = range(5)
-"""Values of `State.carry_stage`: nothing is between both hands; it goes to or stays at a place in the world;
-it is kept before the body; the place was refused, and it stays where it was against the body; it is kept
-before the body until the person stands, and then goes to its place."""
+
+class CarryStage(IntEnum):
+    """What both hands do with what they hold between them."""
+
+    FREE = 0
+    """There is nothing."""
+    PLACING = 1
+    """It goes to or stays at a place in the world."""
+    CARRYING = 2
+    """It is kept before the body."""
+    STOPPED = 3
+    """The place was refused, and it stays where it was against the body."""
+    WAITING = 4
+    """It is kept before the body until the person stands, and then goes to its place."""
 
 
 COUNTS = ("spawn_count", "visit_count", "reach_count", "_refusals")
@@ -219,7 +230,7 @@ class State:
     reach_weight: FloatArray = _array(2)
     """Share of the reach in the pose, 0 to 1. (character, 2)"""
     reach_lead_time: FloatArray = _array(2)
-    """Least time between rest and goal, s. (character, 2)"""
+    """Least time from rest to the goal as found when the hand set out, s. (character, 2)"""
     reach_seen: FloatArray = _array(2, 3)
     """Target in the root frame as last seen, m. (character, 2, 3)"""
     reach_seen_velocity: FloatArray = _array(2, 3)
@@ -324,7 +335,7 @@ class State:
     """1 where the segment touches the object. (character, 2, 15)"""
 
     carry_stage: ByteArray = _array(dtype=np.uint8)
-    """What both hands do with what they hold between them, see `FREE`. (character,)"""
+    """What both hands do with what they hold between them, a `CarryStage`. (character,)"""
     carry_progress: FloatArray = _array()
     """Progress from where the object set out to where it goes, 0 to 1. (character,)"""
     carry_seconds: FloatArray = _array()

@@ -13,6 +13,8 @@ from crowd.motion.rotation import conjugate, from_vector, multiply, to_vector
 from crowd_kernels.reach_state import OUT_OF_REACH, REACHED
 
 PEOPLE = 1000
+FRAME_RATE = 60.0
+"""Numbers of frames below are as for so many steps per second."""
 GOING, COMING = 85, 110
 """Frames in which every hand has come to its target, and back to rest."""
 TURNING = 80
@@ -116,6 +118,10 @@ class Run:
         self.reachers = reachers
         self.motion = JointMotion(reachers.simulation.dt)
 
+    def frames(self, count: int) -> int:
+        """Frames of this run that take as long as so many of `FRAME_RATE`."""
+        return round(count / FRAME_RATE / self.reachers.simulation.dt)
+
     def step(self, count: int, before: Callable[[int], None] | None = None) -> None:
         """Go on for some frames; `before` is called with the number of each."""
         for frame in range(count):
@@ -160,10 +166,10 @@ def run_batch(
     """Reach for targets with one hand and return; it has `further` frames for each way."""
     run = Run(reachers)
     reachers.reach(hand, target, rotation)
-    run.step(GOING + further)
+    run.step(run.frames(GOING + further))
     (jitter,) = run.wait((hand,))
     outcome = run.outcome(hand, target, rotation)
-    run.end((hand,), np.zeros((len(target), 1), np.int64), COMING + further)
+    run.end((hand,), np.zeros((len(target), 1), np.int64), run.frames(COMING + further))
     return Outcome(*outcome, run.motion.speed, run.motion.acceleration, jitter)
 
 
@@ -184,7 +190,8 @@ def send_on(
     people = len(reachers.rows)
     direction, axis = random_turns(people, rng), random_turns(people, rng)
     begun = np.zeros(people, np.int64)
-    due = rng.integers(SOON, LATE, (len(targets), len(reachers.rows)))
+    due = rng.integers(run.frames(SOON), run.frames(LATE), (len(targets), len(reachers.rows)))
+    swaying = run.frames(SWAYING)
     due[0] = 0
     due = due.cumsum(axis=0)
 
@@ -195,31 +202,33 @@ def send_on(
                 reachers.reach(hand, target, rotation, rows)
                 begun[rows] = frame
             if moves:
-                away = SWAY * sway(frame - begun)[:, None]
-                turn = from_vector(SWAY_TURN * sway(frame - begun)[:, None] * axis)
+                share = sway(frame - begun, swaying)[:, None]
+                away = SWAY * share
+                turn = from_vector(SWAY_TURN * share * axis)
                 turned = None if rotation is None else multiply(turn, rotation)
                 reachers.move(hand, target + away * direction, turned, reachers.rows[begin == begun])
 
-    swaying = 2 * SWAYING if moves else 0
-    run.step(int(due.max()) + swaying + GOING + 2 * TURNING, start)
+    moving = 2 * swaying if moves else 0
+    run.step(int(due.max()) + moving + run.frames(GOING + 2 * TURNING), start)
     (jitter,) = run.wait((hand,))
     outcome = run.outcome(hand, targets[-1], rotations[-1])
-    run.end((hand,), np.zeros((len(reachers.rows), 1), np.int64), COMING)
+    run.end((hand,), np.zeros((len(reachers.rows), 1), np.int64), run.frames(COMING))
     return Outcome(*outcome, run.motion.speed, run.motion.acceleration, jitter)
 
 
-def sway(frames: npt.NDArray[np.int64]) -> FloatArray:
+def sway(frames: npt.NDArray[np.int64], period: int) -> FloatArray:
     """How far targets are on their way there and back, 0 to 1, some frames (N,) after they came."""
-    return np.where(frames < 2 * SWAYING, 0.5 - 0.5 * np.cos(2.0 * np.pi * frames / SWAYING), 0.0)
+    return np.where(frames < 2 * period, 0.5 - 0.5 * np.cos(2.0 * np.pi * frames / period), 0.0)
 
 
 def run_both(reachers: Reachers, rng: np.random.Generator, times: int) -> list[Outcome]:
     """Reach with both hands for targets anywhere, `times` one after the other, each hand at its own time."""
     run = Run(reachers)
     hands = range(len(SIDES))
+    together, going = run.frames(TOGETHER), run.frames(TOGETHER + BOTH_GOING)
     for _ in range(times):
         target = [random_targets(reachers, hand, rng, is_far=False) for hand in hands]
-        due = rng.integers(0, TOGETHER, (len(reachers.rows), len(hands)))
+        due = rng.integers(0, together, (len(reachers.rows), len(hands)))
 
         def start(frame: int, target: list[FloatArray] = target, due: npt.NDArray[np.int64] = due) -> None:
             for hand in hands:
@@ -227,10 +236,10 @@ def run_both(reachers: Reachers, rng: np.random.Generator, times: int) -> list[O
                 if rows.size:
                     reachers.reach(hand, target[hand], None, rows)
 
-        run.step(TOGETHER + BOTH_GOING, start)
+        run.step(going, start)
     jitter = run.wait(hands)
     outcomes = [run.outcome(hand, target[hand], None) for hand in hands]
-    run.end(hands, rng.integers(0, TOGETHER, (len(reachers.rows), len(hands))), TOGETHER + BOTH_GOING)
+    run.end(hands, rng.integers(0, together, (len(reachers.rows), len(hands))), going)
     motion = run.motion
     return [Outcome(*outcomes[hand], motion.speed, motion.acceleration, jitter[hand]) for hand in hands]
 

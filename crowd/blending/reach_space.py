@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import spline_filter1d
 from scipy.spatial import Delaunay, cKDTree
 from scipy.stats import qmc
 
 from crowd.blending.reach_cubes import along_curve, divide_space
 from crowd.errors import MotionError, describe
 from crowd.motion.clip import Clip
-from crowd.motion.clip_table import key_intervals, rows, sample_keys
+from crowd.motion.clip_table import key_intervals, rows
 from crowd.motion.rotation import multiply, rotate
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd_kernels.aligned import aligned_copy, aligned_zeros
@@ -52,10 +51,8 @@ WIDEST_TURN = np.radians(75.0)
 """Examples farther apart than this about the body's axis are not blended, rad."""
 SEED = 5
 SIDES = ("right", "left")
-FRAME_RATE = 60.0
-"""Frames per second that are read of examples."""
 KEY_RATE = 30.0
-"""Keys per second of the curves through them."""
+"""Keys per second of the smooth curves that go through the frames of examples."""
 FEWEST_INTERVALS = 2
 """Curves have at least three keys."""
 ARM_PARTS = ("clavicle", "upper_arm", "forearm", "hand")
@@ -200,23 +197,19 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
     if len(joints) > JOINTS:
         raise MotionError(describe("reach", "too many joints of the body", len(joints), f"at most {JOINTS}"))
     clips = [clip for part in sets for clip in part]
-    sampled = [sample_keys(clip, FRAME_RATE) for clip in clips]
-    frames = np.cumsum([len(rotation) for rotation, _ in sampled])[:-1]
-    padded = rows(np.concatenate([rotation[:, joints] for rotation, _ in sampled]))
+    frames = np.cumsum([clip.frame_count for clip in clips])[:-1]
+    padded = rows(np.concatenate([clip.rotation_local[:, joints] for clip in clips]))
     compact = padded.reshape(-1, 4, PADDED_JOINTS)[:, :, :JOINTS].reshape(-1, ROW)
     curves = [control_points(part, clip) for part, clip in zip(np.split(compact, frames), clips, strict=True)]
     count = np.array([len(curve) for curve in curves], np.int32)
     first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
     rotation = np.concatenate(curves)
-    pelvis = np.concatenate(
-        [control_points(part, clip) for (_, part), clip in zip(sampled, clips, strict=True)]
-    )
+    pelvis = np.concatenate([control_points(clip.pelvis_position_root, clip) for clip in clips])
     apex_time = np.array([clip.reach.apex for clip in clips if clip.reach is not None])
     end_time = np.array([clip.duration for clip in clips])
     member = np.zeros((4, JOINTS), np.float32)
     for place, joint in enumerate(joints):
         member[groups[joint], place] = 1.0
-    starts = np.cumsum([0, *(len(part) for part in sets)])[:-1]
     chains = np.array([arm_chain(skeleton, side) for side in SIDES])
     return ReachKeys(
         aligned_copy(rotation),
@@ -226,7 +219,7 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
         apex_time / end_time * (count - 1),
         apex_time,
         end_time,
-        np.ascontiguousarray(pelvis[first[starts]], np.float64),
+        np.array([part[0].pelvis_position_root[0] for part in sets], np.float64),
         int(sum(len(part) for part in sets[: len(SIDES)])),
         np.array(joints, np.int32),
         aligned_copy(member.ravel()),
@@ -240,11 +233,14 @@ def pack_keys(skeleton: Skeleton, sets: Sequence[Sequence[Clip]]) -> ReachKeys:
 
 
 def control_points(frames: npt.NDArray[np.float32], clip: Clip) -> npt.NDArray[np.float32]:
-    """Control points (k, L) of a smooth curve through frames (F, L) of a clip, see `key_shares`."""
+    """Control points (k, L) of a curve of `key_shares` that meets frames (F, L) of a clip at every key."""
     count = max(key_intervals(clip, KEY_RATE), FEWEST_INTERVALS) + 1
     curve = CubicSpline(np.linspace(0.0, 1.0, len(frames)), frames)
-    points = spline_filter1d(curve(np.linspace(0.0, 1.0, count)), order=2, axis=0, mode="mirror")
-    return np.asarray(points, np.float32)
+    shares = np.zeros((count, count))
+    for key in range(count):
+        first, *own = key_shares(float(key), count)
+        shares[key, first : first + len(own)] = own
+    return np.linalg.solve(shares, curve(np.linspace(0.0, 1.0, count))).astype(np.float32)
 
 
 def rest_position(skeleton: Skeleton, joint: int) -> FloatArray:

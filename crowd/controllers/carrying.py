@@ -15,17 +15,7 @@ from crowd.model import Model
 from crowd.motion.easing import minimum_jerk
 from crowd.motion.rotation import about, conjugate, from_vector, multiply, rotate, to_vector
 from crowd.people import shoulders_world
-from crowd.state import (
-    CARRYING,
-    FREE,
-    PLACING,
-    STOPPED,
-    WAITING,
-    BoolArray,
-    FloatArray,
-    IntArray,
-    State,
-)
+from crowd.state import BoolArray, CarryStage, FloatArray, IntArray, State
 from crowd_kernels.reach_goal import is_inside_body
 from crowd_kernels.reach_state import HOLD, MOVE, MOVING, OUT_OF_REACH, REFUSED
 
@@ -96,7 +86,7 @@ class Carrying:
 
     def activate(self, state: State, characters: IntArray) -> None:
         """Start people with empty hands."""
-        state.carry_stage[characters] = FREE
+        state.carry_stage[characters] = CarryStage.FREE
 
     # ---- what is asked
 
@@ -131,7 +121,7 @@ class Carrying:
             is_blocked |= self._is_blocked(state, characters, hand, place)
             is_inside |= self._is_inside(state, characters, place)
         is_refused = is_blocked | is_inside
-        self._begin(state, characters, np.where(is_refused, STOPPED, PLACING))
+        self._begin(state, characters, np.where(is_refused, CarryStage.STOPPED, CarryStage.PLACING))
         state.reach_count[characters] += 1
         state.reach_is_blocked[characters] = is_blocked[:, None]
         state.reach_refusals[characters] += is_refused[:, None]
@@ -166,11 +156,11 @@ class Carrying:
         items = np.flatnonzero(right & left).astype(np.int32)
         rows = self._objects.holder[items]
         if rows.size == 0:
-            state.carry_stage.fill(FREE)
+            state.carry_stage.fill(CarryStage.FREE)
             return
         is_empty = np.ones(state.capacity, np.bool_)
         is_empty[rows] = False
-        state.carry_stage[is_empty] = FREE
+        state.carry_stage[is_empty] = CarryStage.FREE
         self._notice(state, rows, items)
         returns = np.asarray(~np.isin(state.reach_stage[rows], (HOLD, MOVE)).all(axis=1))
         self._change(state, rows, returns)
@@ -180,18 +170,18 @@ class Carrying:
     def _change(self, state: State, rows: IntArray, returns: BoolArray) -> None:
         """Let things be carried whose holders take the hands back or walk, and others go to their places."""
         stage, walking = state.carry_stage[rows], state.locomotion_weight[rows]
-        leaves = (stage == PLACING) & (walking > WALKING)
+        leaves = (stage == CarryStage.PLACING) & (walking > WALKING)
         is_there = state.carry_progress[rows] >= 1.0
         new = stage.copy()
-        new[leaves & ~is_there] = WAITING
-        new[(stage == WAITING) & (walking < STANDING)] = PLACING
-        new[returns | (leaves & is_there)] = CARRYING
+        new[leaves & ~is_there] = CarryStage.WAITING
+        new[(stage == CarryStage.WAITING) & (walking < STANDING)] = CarryStage.PLACING
+        new[returns | (leaves & is_there)] = CarryStage.CARRYING
         changed = new != stage
         self._begin(state, rows[changed], new[changed])
 
     def _notice(self, state: State, rows: IntArray, items: IntArray) -> None:
         """Leave objects that two hands have just taken where they are."""
-        new = state.carry_stage[rows] == FREE
+        new = state.carry_stage[rows] == CarryStage.FREE
         if not new.any():
             return
         rows, items = rows[new], items[new]
@@ -206,7 +196,7 @@ class Carrying:
         # Hands are to hold it as they do: what they lacked when they closed is not wanted any more.
         state.reach_missing_place[rows] = 0.0
         state.reach_missing_turn[rows] = 0.0
-        self._begin(state, rows, np.full(rows.size, PLACING))
+        self._begin(state, rows, np.full(rows.size, CarryStage.PLACING))
         stays = rows[~self._lacks[rows]]
         state.carry_progress[stays] = 1.0
         state.carry_seconds[stays] = 0.0
@@ -219,7 +209,7 @@ class Carrying:
         state.carry_progress[rows] = 0.0
         for name in ("position", "rotation", "velocity", "turn_velocity"):
             getattr(state, f"carry_start_{name}")[rows] = getattr(state, f"carry_{name}")[rows]
-        state.reach_is_blocked[rows] &= (stage == STOPPED)[:, None]
+        state.reach_is_blocked[rows] &= (stage == CarryStage.STOPPED)[:, None]
         items = np.array([self._object_of(row) for row in rows], np.int32)
         position, rotation = self._goal(state, rows, items)
         way = np.linalg.norm(position - state.carry_position[rows], axis=1)
@@ -239,7 +229,8 @@ class Carrying:
         position = rotate(back, state.carry_place_world[rows] - state.position_world[rows])
         rotation = multiply(back, state.carry_place_rotation_world[rows])
         stage = state.carry_stage[rows]
-        carries, stopped = np.isin(stage, (CARRYING, WAITING)), stage == STOPPED
+        carries = np.isin(stage, (CarryStage.CARRYING, CarryStage.WAITING))
+        stopped = stage == CarryStage.STOPPED
         grip = state.carry_grip_rotation[rows]
         before = np.zeros((rows.size, 3))
         before[:, 1] = self.settings.height * self._stature[rows] - self._rise_of_hands(items, grip)
@@ -332,8 +323,8 @@ class Carrying:
 
     def end(self, state: State, characters: IntArray) -> None:
         """Let people whose hands open go on with each by itself: targets are those of wrists again."""
-        rows = np.unique(characters[state.carry_stage[characters] != FREE])
-        state.carry_stage[rows] = FREE
+        rows = np.unique(characters[state.carry_stage[characters] != CarryStage.FREE])
+        state.carry_stage[rows] = CarryStage.FREE
         for hand in (0, 1):
             point = state.reach_point_hand[rows, hand]
             world = rotate(state.reach_target_rotation_world[rows, hand], point)
@@ -343,12 +334,12 @@ class Carrying:
 
     def report(self, state: State) -> None:
         """Tell how hands with an object between them stand, after the reach layer has told it of each."""
-        rows = np.flatnonzero(state.carry_stage != FREE)
+        rows = np.flatnonzero(state.carry_stage != CarryStage.FREE)
         if rows.size == 0:
             return
-        is_there = (state.carry_progress[rows] >= 1.0) & (state.carry_stage[rows] != WAITING)
+        is_there = (state.carry_progress[rows] >= 1.0) & (state.carry_stage[rows] != CarryStage.WAITING)
         state.reach_stage[rows[~is_there]] = MOVE
         state.reach_status[rows[~is_there]] = MOVING
         far = rows[is_there & self._lacks[rows]]
         state.reach_status[far] = OUT_OF_REACH
-        state.reach_status[rows[state.carry_stage[rows] == STOPPED]] = REFUSED
+        state.reach_status[rows[state.carry_stage[rows] == CarryStage.STOPPED]] = REFUSED

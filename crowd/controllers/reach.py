@@ -22,7 +22,7 @@ from crowd.motion.mirror import mirrored, opposite
 from crowd.motion.procedural.reaching import seated_reaches, standing_reaches
 from crowd.motion.skeleton import Segment, Skeleton
 from crowd.people import shoulders_world
-from crowd.state import FREE, FloatArray, IntArray, State
+from crowd.state import CarryStage, FloatArray, IntArray, State
 from crowd.world import World
 from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
@@ -94,7 +94,7 @@ class ReachSettings:
     """Likewise where both hands reach, which push joints to their limits more often."""
     rest_acceleration: float = 0.1
     """Where both hands wait that cannot both be where they should, joints turn faster than this times the
-    time they have waited, or rest, rad/s^2."""
+    time they have waited, at most 3 s, or rest, rad/s^2."""
     limit_rate: float = 8.0
     """Rate with which joints approach their limits at most, 1/s; larger: harder stops."""
     tolerance: float = 7e-4
@@ -239,6 +239,7 @@ class Reach:
         state.reach_hold_left[characters, hands] = np.inf if hold is None else hold
         state.reach_seconds[characters, hands] = 0.0 if seconds is None else seconds
         state.reach_count[characters, hands] += 1
+        state.reach_waited[characters] = 0.0
         state.reach_is_own[characters, hands] = is_own
         state.reach_is_blocked[characters, hands] = False
         if not is_own:
@@ -428,7 +429,7 @@ class Reach:
                 self._iterations,
             )
         # Hands that hold one thing between them stay at it whatever their joints must do.
-        carries = reaching[state.carry_stage[reaching] != FREE]
+        carries = reaching[state.carry_stage[reaching] != CarryStage.FREE]
         self._bound[carries] = 0.0
         state.reach_waited[carries] = 0.0
         shared = hands == BOTH_HANDS

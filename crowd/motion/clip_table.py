@@ -123,12 +123,12 @@ def key_intervals(clip: Clip, rate: float = KEY_RATE) -> int:
     return max(round(clip.duration * rate), 1)
 
 
-def sample_keys(clip: Clip, rate: float = KEY_RATE) -> tuple[Float32Array, Float32Array]:
+def sample_keys(clip: Clip) -> tuple[Float32Array, Float32Array]:
     """Resample a clip to its keys: rotations (k, J, 4) and pelvis positions (k, 3)."""
     if clip.kind is ClipKind.LOCOMOTION:
         times = phase_times(clip, np.arange(2 * KEYS_PER_CYCLE) / KEYS_PER_CYCLE)
     else:
-        intervals = key_intervals(clip, rate)
+        intervals = key_intervals(clip)
         times = np.arange(intervals if clip.is_cyclic else intervals + 1) * clip.duration / intervals
     position = np.clip(times * clip.frame_rate, 0, clip.frame_count - 1)
     before = np.minimum(position.astype(int), max(clip.frame_count - 2, 0))

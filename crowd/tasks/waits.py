@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from crowd.controllers.controller import Step
 from crowd.controllers.grab import HOLDING, OPEN, GrabStatus
-from crowd.state import CARRYING, BoolArray, IntArray
+from crowd.state import BoolArray, CarryStage, IntArray
 from crowd.tasks.present_task import does
 from crowd.tasks.settle import is_settled
 from crowd.tasks.task_list import Hand, TaskKind
@@ -149,7 +149,7 @@ def _has(wait: Wait, tasks: Tasks, step: Step, rows: IntArray) -> BoolArray:
             return _all_hands(state.grab_stage[rows] == OPEN, hands)
         case Wait.WITHDRAWN:
             # What both hands hold is before the body then, and the hands at it.
-            carries = (state.carry_stage[rows] == CARRYING) & (state.carry_progress[rows] >= 1.0)
+            carries = (state.carry_stage[rows] == CarryStage.CARRYING) & (state.carry_progress[rows] >= 1.0)
             return np.asarray(_all_hands(state.reach_stage[rows] == NONE, hands) | carries)
         case Wait.SEATED:
             return state.sitting_time[rows] >= simulation.sitting.seconds(step)

@@ -23,10 +23,12 @@ from crowd_kernels.reach_time import reach_time, set_out
 from crowd_kernels.vector import Vector, norm
 
 CHUNKS = 32
-STILL = 1e-3
-"""Targets slower than this stand still, m/s."""
-FAR_OFF = 0.003
+STILL, STILL_TURN = 1e-5, 1e-2
+"""Targets slower than this stand still, m/s and rad/s."""
+FAR_OFF = 0.008
 """Hands closer than this to their goals still come there, m."""
+LONGEST_WAIT = 3.0
+"""People wait no longer for joints to come to rest, s."""
 
 
 @inlined_kernel
@@ -34,8 +36,10 @@ def is_waiting(character: int, state: ReachState) -> bool:
     """Tell whether both hands of a character wait for what stands still, one of them far from its goal."""
     is_far = False
     for arm in range(2):
-        speed = norm(vector_of(state.seen_velocity, character, arm))
-        if state.stage[character, arm] != HOLD or speed > STILL:
+        if state.stage[character, arm] != HOLD:
+            return False
+        moves = norm(vector_of(state.seen_velocity, character, arm)) > STILL
+        if moves or norm(vector_of(state.turn_velocity, character, arm)) > STILL_TURN:
             return False
         missing = norm(vector_of(state.missing_place, character, arm))
         is_far = is_far or (state.status[character, arm] == OUT_OF_REACH and missing > FAR_OFF)
@@ -156,13 +160,17 @@ def reach_character(
             )
         follow_rotation(character, arm, turned, limits, dt, state)
         there, back = follow_weights(character, arm, limits, keys, dt, state)
-        set_out(character, arm, walking_share, keys, limits, state, live, rows[:ROW])
-        time = reach_time(character, arm, there, size, weight[1 - arm], limits, state)
+        slower, other = back / there, weight[1 - arm]
+        set_out(character, arm, slower, other, walking_share, keys, limits, state, live, rows[:ROW])
+        time = reach_time(character, arm, there, size, other, limits, state)
         advance_course(character, arm, 1.0 / time, there / (back * time), limits, dt, state)
         if state.stage[character, arm] != NONE:
             share, _ = course_shares(state.course[character, arm], limits.lead)
             state.weight[character, arm] = share
             own = (share, own[1]) if arm == 0 else (own[0], share)
+    # Where people walk or sit, hands that are at their goals must make up for what moves them.
+    waits = upper_share <= 0.0 and is_waiting(character, state)
+    state.waited[character] = min(state.waited[character] + dt, LONGEST_WAIT) if waits else 0.0
     blend_body(character, walking_share, keys, own, state, rows, pose, pelvis)
     for arm in range(2):
         out_task[character, arm] = 0
@@ -192,9 +200,6 @@ def reach_character(
                 out_kept,
                 out_bound,
             )
-    # Where people walk or sit, hands that are at their goals must make up for what moves them.
-    waits = upper_share <= 0.0 and is_waiting(character, state)
-    state.waited[character] = state.waited[character] + dt if waits else 0.0
 
 
 @parallel_kernel

@@ -305,7 +305,10 @@ def find_examples(
 def follow_weights(
     character: int, arm: int, limits: ReachLimits, keys: ReachKeys, dt: float, state: ReachState
 ) -> tuple[float, float]:
-    """Bring the weights of one hand's examples nearer to those that are wanted, by when its glide ends.
+    """Bring the weights of one hand's examples nearer to those that are wanted.
+
+    They are there when its glide ends, but no sooner than in `example_time`, which is longer where much is to
+    change.
 
     The weights of a look-up have kinks as a target moves; those of the blend follow them smoothly.
 

@@ -35,7 +35,7 @@ from crowd_kernels.vector import Vector, add, norm, scaled, subtract
 TURNING_ROUND = 0.7
 """Further time for a hand that glides already, over that since its glide began or until it ends."""
 ON_THE_WAY = 0.4
-"""Share of the acceleration of joints that glides have before the apex, where examples have their own."""
+"""Share of the acceleration of joints that glides have beside the apex, where examples have their own."""
 SPARED = 0.65
 """What hopeless ways are shorter by than the longest that there is, over `longest`, see `shortened`."""
 
@@ -192,7 +192,6 @@ def plan_glide(
         In: weights of the examples and those wanted. In and out: the glide.
     rows : (192,) float32
         Scratch.
-
     """
     now, then = rows[:ROW], rows[ROW : 2 * ROW]
     body, body_turned = blend_apex(

@@ -77,9 +77,10 @@ def see_target(
     expected = add(seen, scaled(vector_of(state.seen_velocity, character, arm), dt))
     velocity = scaled(subtract(target, seen), 1.0 / dt)
     left = state.time_left[character, arm]
-    # One that has just jumped has got another velocity, which the glide must know as well.
     goes_on = left > 0.0 and state.plan_time[character, arm] - left < 1.5 * dt
-    largest = limits.acceleration * (AFTER_JUMP if goes_on else 1.0)
+    # One that has just jumped has got another velocity, which the glide must know as well.
+    is_unknown = goes_on and norm(vector_of(state.seen_velocity, character, arm)) == 0.0
+    largest = limits.acceleration * (AFTER_JUMP if is_unknown else 1.0)
     has_jumped = norm(subtract(target, expected)) > largest * dt * dt
     if has_jumped and (not goes_on or norm(velocity) > limits.target_speed):
         velocity = (0.0, 0.0, 0.0)

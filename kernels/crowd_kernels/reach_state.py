@@ -82,7 +82,8 @@ class ReachState(NamedTuple):
     """(N,) For how long both hands have waited of people who stand, one of them far from its goal, s."""
     weight: npt.NDArray[np.float64]
     lead_time: npt.NDArray[np.float64]
-    """(N, 2) Least time between rest and goal, s."""
+    """(N, 2) Least time from rest to the goal, s, as found when the hand set out, and anew when it returned:
+    the way back takes longer in proportion. A time that is asked for goes before it."""
     seen: npt.NDArray[np.float64]
     seen_velocity: npt.NDArray[np.float64]
     offset: npt.NDArray[np.float64]

@@ -60,6 +60,7 @@ def turn_to_examples(
     character: int,
     arm: int,
     course: float,
+    other: float,
     walking_share: float,
     keys: ReachKeys,
     state: ReachState,
@@ -73,6 +74,8 @@ def turn_to_examples(
     character, arm : int
     course : float
         0 or `END`: the examples are at rest.
+    other : float
+        Share of the other hand's examples.
     walking_share : float
         Share of locomotion in the pose.
     keys : ReachKeys
@@ -91,14 +94,17 @@ def turn_to_examples(
     _, whole = sum_examples(character, arm, 0, course, state.example_weight, keys, state, row)
     _, upper = sum_examples(character, arm, 1, course, state.example_weight, keys, state, row)
     unit_row(row)
-    other = LEFT_ARM if arm == 0 else RIGHT_ARM
+    own_arm, other_arm = (RIGHT_ARM, LEFT_ARM) if arm == 0 else (LEFT_ARM, RIGHT_ARM)
     largest = 0.0
     for k in range(keys.joint.shape[0]):
-        share = 1.0
+        # As in `blend_shares`: trunk and legs are shared, the other arm balances where it is free.
+        share = 1.0 / (1.0 + other)
         if keys.group[LOWER * JOINTS + k] > ZERO:
-            share = whole / (whole + upper)
-        elif keys.group[other * JOINTS + k] > ZERO:
-            share = 1.0 - walking_share
+            share *= whole / (whole + upper)
+        elif keys.group[other_arm * JOINTS + k] > ZERO:
+            share = (1.0 - other) * (1.0 - walking_share)
+        elif keys.group[own_arm * JOINTS + k] > ZERO:
+            share = 1.0
         largest = max(largest, share * 2.0 * math.acos(abs(joint_cosine(row, live, k))))
     return largest
 
@@ -107,6 +113,8 @@ def turn_to_examples(
 def set_out(
     character: int,
     arm: int,
+    slower: float,
+    other: float,
     walking_share: float,
     keys: ReachKeys,
     limits: ReachLimits,
@@ -120,6 +128,8 @@ def set_out(
 
     Parameters
     ----------
+    slower : float
+        Time of the way back over that of the way there.
     limits : ReachLimits
     state : ReachState
         In and out: `lead_time`.
@@ -132,8 +142,9 @@ def set_out(
     returns = course == APEX and state.stage[character, arm] == RETURN
     if course == 0.0 or returns:
         rest = END if returns else 0.0
-        turn = turn_to_examples(character, arm, rest, walking_share, keys, state, live, row)
-        state.lead_time[character, arm] = time_to_turn(turn, limits.lead_acceleration) / limits.lead
+        turn = turn_to_examples(character, arm, rest, other, walking_share, keys, state, live, row)
+        time = time_to_turn(turn, limits.lead_acceleration) / limits.lead
+        state.lead_time[character, arm] = time / slower if returns else time
 
 
 @inlined_kernel

@@ -11,7 +11,7 @@ from crowd.motion.rotation import conjugate, rotate
 from crowd.scenario.load import scenario_from
 from crowd.scenario.source import ScenarioSource
 from crowd.simulation import Simulation
-from crowd.state import CARRYING, FREE, PLACING, WAITING
+from crowd.state import CarryStage
 from crowd_kernels.reach_state import MOVING, NONE, OUT_OF_REACH, REACHED, REFUSED
 
 THINGS = [
@@ -146,7 +146,7 @@ def test_large_things_are_carried_with_both_hands(carriers: Simulation) -> None:
     assert objects.holder_hand.all()
     carriers.commands.end_reach(slice(None))
     advance(carriers, 1.5)
-    assert (state.carry_stage == CARRYING).all()
+    assert (state.carry_stage == CarryStage.CARRYING).all()
     carriers.commands.set_locomotion(slice(None), (1.2, 0.3, 0.0))
     places = []
     for _ in range(120):
@@ -167,7 +167,7 @@ def test_a_large_thing_is_put_down_with_both_hands(carriers: Simulation) -> None
     wanted = state.position_world + 0.45 * heading + np.array([0.0, 0.95, 0.0])
     carriers.commands.put(slice(None), wanted)
     advance(carriers, 2.0)
-    assert (state.carry_stage == PLACING).all()
+    assert (state.carry_stage == CarryStage.PLACING).all()
     assert np.linalg.norm(objects.position_world - wanted, axis=1).max() < 0.01
     carriers.commands.let_go(slice(None))
     advance(carriers, 1.0)
@@ -239,13 +239,13 @@ def test_what_walkers_put_is_carried_until_they_stand() -> None:
     simulation = two_handed()
     simulation.commands.set_locomotion(0, (1.0, 0.0, 0.0))
     assert worst_apart(simulation, 1.5) < 1e-3
-    assert simulation.state.carry_stage[0] == CARRYING
+    assert simulation.state.carry_stage[0] == CarryStage.CARRYING
     simulation.commands.put(0, (0.0, 1.0, 2.5))
     assert worst_apart(simulation, 0.5) < 1e-3
-    assert simulation.state.carry_stage[0] == WAITING
+    assert simulation.state.carry_stage[0] == CarryStage.WAITING
     simulation.commands.set_locomotion(0, (0.0, 0.0, 0.0))
     assert worst_apart(simulation, 3.0) < 1e-3
-    assert simulation.state.carry_stage[0] == PLACING
+    assert simulation.state.carry_stage[0] == CarryStage.PLACING
 
 
 @pytest.mark.parametrize(("place", "reason"), [
@@ -288,7 +288,7 @@ def test_both_hands_give_to_both_hands() -> None:
     assert (simulation.state.reach_stage[0] == NONE).all()
     simulation.commands.end_reach(1)
     assert worst_apart(simulation, 1.5) < 1e-3
-    assert simulation.state.carry_stage.tolist() == [FREE, CARRYING, FREE]
+    assert simulation.state.carry_stage.tolist() == [CarryStage.FREE, CarryStage.CARRYING, CarryStage.FREE]
 
 
 def test_a_hand_can_be_named_where_each_holds_something() -> None:

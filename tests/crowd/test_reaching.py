@@ -11,13 +11,16 @@ from crowd.blending.reach_space import (
     SIDES,
     ReachSpace,
     blend_positions,
+    control_points,
     hand_position,
 )
 from crowd.motion.body import build_skeleton, sole_points
+from crowd.motion.clip import Clip, ClipKind, ReachLabels
 from crowd.motion.mirror import mirrored
 from crowd.motion.procedural.reach_pose import centre_of_mass, place_joints
 from crowd.motion.procedural.reaching import seated_reaches, standing_reaches
 from crowd.motion.rotation import rotate
+from crowd_kernels.reach_blend import key_shares
 from tests.oracles import reach as oracle
 
 SKELETON = build_skeleton()
@@ -170,3 +173,23 @@ def test_examples_do_not_accelerate_more_however_often_they_are_drawn(space, num
     _, wanted = angular_motion(frames[:, None], 1.0 / clip.frame_rate)
     _, found = angular_motion(played(space, number, rate)[0][:, None], 1.0 / rate)
     assert found < 1.1 * wanted
+
+
+@pytest.mark.parametrize("rate", [25.0, 120.0])
+@pytest.mark.parametrize("seconds", [0.1, 0.5])
+def test_curves_meet_frames_of_clips_of_any_rate_that_begin_and_end_while_moving(rate, seconds):
+    count = round(seconds * rate) + 1
+    time = np.arange(count) / rate
+    frames = np.stack([time, 0.3 * np.sin(6.0 * time)], axis=1).astype(np.float32)
+    still = np.zeros((count, 3), np.float32)
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1, 1)).astype(np.float32)
+    label = ReachLabels("right", 0.05, (0.0, 1.0, 0.0))
+    heading = np.zeros(count)
+    clip = Clip("reach", ClipKind.REACH, rate, upright, still, still, heading, is_cyclic=False, reach=label)
+    points = control_points(frames, clip)
+    curve = []
+    for place in np.linspace(0.0, len(points) - 1.0, count):
+        first, *shares = key_shares(place, len(points))
+        curve.append(np.dot(shares, points[first : first + 3]))
+    np.testing.assert_allclose(curve, frames, atol=2e-3)
+    np.testing.assert_allclose(np.array(curve)[[0, -1]], frames[[0, -1]], atol=1e-5)

@@ -10,7 +10,7 @@ from crowd.checkpoint import state_arrays
 from crowd.controllers.grab import CLOSING, HOLDING, OPEN
 from crowd.errors import MotionError
 from crowd.motion.procedural import built_in_library
-from crowd.state import CARRYING, PLACING
+from crowd.state import CarryStage
 from crowd.tasks.events import EventKind
 
 ROOM = """
@@ -333,7 +333,7 @@ def test_a_run_stopped_while_hands_reach_hold_and_hand_over_goes_on_with_equal_b
             met |= {f"carries {stage}" for stage in whole.state.carry_stage.tolist()}
         if step - ahead in stops:
             expected[step - ahead] = {name: array.copy() for name, array in state_arrays(whole)}
-    assert met >= {OPEN, CLOSING, HOLDING, f"carries {PLACING}", f"carries {CARRYING}"}
+    assert met >= {OPEN, CLOSING, HOLDING, f"carries {CarryStage.PLACING}", f"carries {CarryStage.CARRYING}"}
     # What the simulation did before, and in which order runs are taken up, leaves nothing behind.
     for stop in reversed(stops):
         other.restore(tmp_path / f"{stop}.npz")

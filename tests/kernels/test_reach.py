@@ -175,7 +175,7 @@ def test_a_hand_hangs_on_the_corrected_trunk(reachers, arm, rng):
         ((HOLD, HOLD), (REACHED, OUT_OF_REACH), (0.0, 0.05), 0.0, True),
         ((HOLD, MOVE), (OUT_OF_REACH, MOVING), (0.05, 0.0), 0.0, False),
         ((HOLD, HOLD), (REACHED, REACHED), (0.0, 0.0), 0.0, False),
-        ((HOLD, HOLD), (OUT_OF_REACH, REACHED), (0.001, 0.0), 0.0, False),
+        ((HOLD, HOLD), (OUT_OF_REACH, REACHED), (0.005, 0.0), 0.0, False),
         ((HOLD, HOLD), (OUT_OF_REACH, REACHED), (0.05, 0.0), 0.1, False),
         ((HOLD, NONE), (OUT_OF_REACH, 0), (0.05, 0.0), 0.0, False),
     ],
@@ -188,6 +188,8 @@ def test_people_wait_with_both_hands_where_nothing_moves_and_one_is_far_off(
     state.missing_place[0, 1, 2] = missing[1]
     state.seen_velocity[0, 1, 0] = speed
     assert is_waiting(0, state) == waits
+    state.turn_velocity[0, 0, 1] = 0.3
+    assert not is_waiting(0, state), "it turns"
 
 
 def status_after(stage, status, distance, angle, has_rotation=False, hold=math.inf):

@@ -51,18 +51,22 @@ def live_row(keys, rng):
 @pytest.mark.parametrize("arm", [0, 1])
 @pytest.mark.parametrize(("upper", "walking"), [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.3, 0.3)])
 @pytest.mark.parametrize("returns", [False, True])
+@pytest.mark.parametrize("other", [0.0, 0.6])
 def test_hands_that_set_out_take_the_time_of_joints_that_are_far_from_the_examples(
-    keys, arm, upper, walking, returns, rng
+    keys, arm, upper, walking, returns, other, rng
 ):
     weights = {2: 1.0 - upper, keys.first_seated + 1: upper}
     state = state_of(arm, example_count=2, course=APEX if returns else 0.0, stage=RETURN if returns else MOVE)
     state.example[0, arm, :2] = list(weights)
     state.example_weight[0, arm, :2] = list(weights.values())
     live, row = live_row(keys, rng)
-    set_out(0, arm, walking, keys, REACH_LIMITS, state, row, np.zeros(ROW, np.float32))
+    set_out(0, arm, 1.3, other, walking, keys, REACH_LIMITS, state, row, np.zeros(ROW, np.float32))
     weights = {clip: weight for clip, weight in weights.items() if weight > 0.0}
-    turn = oracle.turn_to_examples(keys, weights, END if returns else 0.0, live, arm, upper, walking)
-    wanted = time_to_turn(turn, REACH_LIMITS.lead_acceleration) / REACH_LIMITS.lead
+    turn = oracle.turn_to_examples(keys, weights, END if returns else 0.0, live, arm, upper, walking, other)
+    # A way back that takes longer than the way there anyway need not be slowed down as much.
+    wanted = (
+        time_to_turn(turn, REACH_LIMITS.lead_acceleration) / REACH_LIMITS.lead / (1.3 if returns else 1.0)
+    )
     assert state.lead_time[0, arm] == pytest.approx(wanted, rel=1e-3)
 
 
@@ -71,7 +75,7 @@ def test_hands_on_their_way_keep_the_time_with_which_they_set_out(keys, course, 
     state = state_of(0, example_count=1, course=course, stage=stage, lead_time=7.0)
     state.example_weight[0, 0, 0] = 1.0
     row = live_row(keys, rng)[1]
-    set_out(0, 0, 0.0, keys, REACH_LIMITS, state, row, np.zeros(ROW, np.float32))
+    set_out(0, 0, 1.0, 0.0, 0.0, keys, REACH_LIMITS, state, row, np.zeros(ROW, np.float32))
     assert state.lead_time[0, 0] == 7.0
 
 

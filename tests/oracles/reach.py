@@ -112,12 +112,12 @@ def time_of_weights(wanted, weight, limits):
     return limits.example_time * np.sqrt(max(change / limits.weight_change, 1.0))
 
 
-def turn_to_examples(keys, weights, course, live, arm, upper, walking):
+def turn_to_examples(keys, weights, course, live, arm, upper, walking, other):
     """Largest turn of joints from rotations (J, 4) to examples at a course, as far as these count, rad."""
     rotation, _ = blend(keys, weights, course)
     cosine = np.abs((rotation * live).sum(axis=1))
-    share = np.ones(len(cosine))
-    group = keys.group.reshape(4, 24)[:, : len(share)]
-    share[group[0] > 0] = 1.0 - upper
-    share[group[3 - arm] > 0] = 1.0 - walking
+    group = keys.group.reshape(4, 24)[:, : len(cosine)]
+    arms = [1.0, (1.0 - walking) * (1.0 - other)]
+    trunk = 1.0 / (1.0 + other)
+    share = np.array([(1.0 - upper) * trunk, trunk, arms[arm], arms[1 - arm]]) @ group
     return (share * 2.0 * np.arccos(np.minimum(cosine, 1.0))).max()

@@ -58,7 +58,7 @@ class Stance:
         zero = np.zeros_like(time)
         # A whole number of breaths, so that clips that go round do not jump where they do.
         breaths = max(round(seconds / BREATH_SECONDS), 1)
-        breath = np.sin(2.0 * np.pi * breaths * time / max(seconds, BREATH_SECONDS))
+        breath = np.sin(2.0 * np.pi * breaths * time / time[-1])
         arm = [0.03 + 0.008 * breath, 0.14 + 0.01 * breath, 0.26 + zero, 0.12 + zero, zero]
         return cls(
             time,
