@@ -196,6 +196,7 @@ def reach(
         "times examples",
         "rad/s",
         "jitter mm",
+        "beyond deg",
         "ok",
     ):
         table.add_column(title, justify="left" if title == "targets of the" else "right")
@@ -212,9 +213,10 @@ def reach(
             f"{row.acceleration_ratio:.2f}",
             f"{row.speed:.1f}",
             f"{1000.0 * row.jitter:.4f}",
+            f"{math.degrees(row.beyond):.3f}",
             f"[red]{row.problem}[/]" if row.problem else "yes",
         )
-    Console(width=130).print(table)
+    Console(width=150).print(table)
     return 0 if all(not row.problem for row in results) else EXIT_FAILED
 
 

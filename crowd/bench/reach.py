@@ -46,6 +46,8 @@ LEAST_MET = 0.5
 """Least share of hands that are at their targets where both are sent anywhere."""
 LARGEST_JITTER = 1e-4
 """Largest motion of a hand that waits, m per frame."""
+MOST_BEYOND = math.radians(0.1)
+"""Joints are within their limits but for this, rad."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class ReachQuality:
         Over the largest of the examples.
     jitter : float
         Largest motion of a waiting hand, m per frame.
+    beyond : float
+        How far joints were beyond their limits at most, rad.
     problem : str
         What is not as it should be; empty when all is.
     """
@@ -79,6 +83,7 @@ class ReachQuality:
     acceleration_ratio: float
     speed: float
     jitter: float
+    beyond: float
     problem: str
 
 
@@ -99,6 +104,8 @@ class Outcome:
         Largest of any joint, rad/s and rad/s^2.
     jitter : float
         Largest motion of the waiting hand, m per frame.
+    beyond : float
+        How far joints were beyond their limits at most, rad.
     """
 
     target: FloatArray
@@ -109,6 +116,7 @@ class Outcome:
     speed: float
     acceleration: float
     jitter: float
+    beyond: float
 
 
 class Run:
@@ -117,6 +125,7 @@ class Run:
     def __init__(self, reachers: Reachers) -> None:
         self.reachers = reachers
         self.motion = JointMotion(reachers.simulation.dt)
+        self.beyond = 0.0
 
     def frames(self, count: int) -> int:
         """Frames of this run that take as long as so many of `FRAME_RATE`."""
@@ -129,6 +138,7 @@ class Run:
                 before(frame)
             self.reachers.step()
             self.motion.add(self.reachers.local_rotations())
+            self.beyond = max(self.beyond, self.reachers.beyond_limits())
 
     def wait(self, hands: Sequence[int]) -> list[float]:
         """Watch hands that wait; gives the largest motion of each in a frame, m."""
@@ -170,7 +180,7 @@ def run_batch(
     (jitter,) = run.wait((hand,))
     outcome = run.outcome(hand, target, rotation)
     run.end((hand,), np.zeros((len(target), 1), np.int64), run.frames(COMING + further))
-    return Outcome(*outcome, run.motion.speed, run.motion.acceleration, jitter)
+    return Outcome(*outcome, run.motion.speed, run.motion.acceleration, jitter, run.beyond)
 
 
 def send_on(
@@ -213,7 +223,7 @@ def send_on(
     (jitter,) = run.wait((hand,))
     outcome = run.outcome(hand, targets[-1], rotations[-1])
     run.end((hand,), np.zeros((len(reachers.rows), 1), np.int64), run.frames(COMING))
-    return Outcome(*outcome, run.motion.speed, run.motion.acceleration, jitter)
+    return Outcome(*outcome, run.motion.speed, run.motion.acceleration, jitter, run.beyond)
 
 
 def sway(frames: npt.NDArray[np.int64], period: int) -> FloatArray:
@@ -240,8 +250,8 @@ def run_both(reachers: Reachers, rng: np.random.Generator, times: int) -> list[O
     jitter = run.wait(hands)
     outcomes = [run.outcome(hand, target[hand], None) for hand in hands]
     run.end(hands, rng.integers(0, together, (len(reachers.rows), len(hands))), going)
-    motion = run.motion
-    return [Outcome(*outcomes[hand], motion.speed, motion.acceleration, jitter[hand]) for hand in hands]
+    speed, acceleration = run.motion.speed, run.motion.acceleration
+    return [Outcome(*outcomes[hand], speed, acceleration, jitter[hand], run.beyond) for hand in hands]
 
 
 def measure(targets: int, far: int, seed: int = 0) -> list[ReachQuality]:
@@ -335,6 +345,7 @@ def judge(name: str, outcomes: list[Outcome], most: float) -> ReachQuality:
     acceleration = max(outcome.acceleration for outcome in outcomes)
     speed = max(outcome.speed for outcome in outcomes)
     jitter = max(outcome.jitter for outcome in outcomes)
+    beyond = max(outcome.beyond for outcome in outcomes)
     problems = []
     # Nobody has both hands at any two places; but most people have at least one there.
     is_shared = name.startswith("both hands")
@@ -351,6 +362,8 @@ def judge(name: str, outcomes: list[Outcome], most: float) -> ReachQuality:
         problems.append(f"speed over {FASTEST:g} rad/s")
     if jitter > LARGEST_JITTER:
         problems.append("jitter")
+    if beyond > MOST_BEYOND:
+        problems.append("joints beyond their limits")
     return ReachQuality(
         name,
         len(status),
@@ -362,5 +375,6 @@ def judge(name: str, outcomes: list[Outcome], most: float) -> ReachQuality:
         acceleration / most,
         speed,
         jitter,
+        beyond,
         ", ".join(problems),
     )

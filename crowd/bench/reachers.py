@@ -12,6 +12,7 @@ from crowd.motion.library import MotionLibrary
 from crowd.motion.rotation import about, conjugate, multiply, rotate, to_vector
 from crowd.scenario.schema import DEFAULT_DT, Area, Character, Scenario, WorldTable
 from crowd.simulation import Simulation
+from crowd_kernels.ik_tree import TreeArrays
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -117,6 +118,11 @@ class Reachers:
             for clip in part.clips
         )
 
+    def beyond_limits(self) -> float:
+        """How far joints that inverse kinematics turns are beyond their limits at most, rad."""
+        rotation = self.simulation.joint_rotations_local().astype(np.float64)
+        return beyond_limits(self.simulation.reach.tree, rotation)
+
     def local_rotations(self) -> FloatArray:
         """Rotations (N, J, 4) of the joints that reaches move."""
         chosen = self.simulation.reach.space.keys.joint
@@ -141,6 +147,32 @@ def random_turns(count: int, rng: np.random.Generator) -> FloatArray:
     """Draw rotation vectors (N, 3) of 1 rad about any axis."""
     axis = rng.normal(size=(count, 3))
     return np.asarray(axis / np.linalg.norm(axis, axis=1, keepdims=True))
+
+
+def beyond_limits(tree: TreeArrays, rotation: FloatArray) -> float:
+    """Find how far joints are beyond their limits at most, rad; 0 where all are within.
+
+    Parameters
+    ----------
+    tree : TreeArrays
+        Joints that inverse kinematics turns, and their limits: an ellipse of swings and a range of twists.
+    rotation : (N, J, 4) float64
+        Local rotations of all joints of the skeleton.
+    """
+    limited = np.flatnonzero((tree.is_limited != 0) & (tree.weight > 0.0))
+    inner, outer = tree.parent_frame[limited].astype(float), tree.joint_frame[limited].astype(float)
+    framed = multiply(conjugate(inner), multiply(rotation[:, tree.joint[limited]], outer))
+    w, x, y, z = np.moveaxis(framed * np.where(framed[..., :1] < 0.0, -1.0, 1.0), -1, 0)
+    length = np.maximum(np.hypot(w, z), 1e-12)
+    swing = np.stack([x * w - y * z, y * w + x * z], axis=-1) / length[..., None]
+    size = np.linalg.norm(swing, axis=-1)
+    share = np.linalg.norm(swing * tree.inverse_swing[limited], axis=-1)
+    on_ellipse = np.minimum(size / np.maximum(share, 1.0), 1.0)
+    swung = 2.0 * (np.arcsin(np.minimum(size, 1.0)) - np.arcsin(on_ellipse))
+    low, high = 2.0 * np.arctan(tree.twist[limited].astype(float)).T
+    twist = 2.0 * np.arctan2(z, w)
+    twisted = np.maximum(twist - high, low - twist) * (tree.is_free[limited, 2] != 0.0)
+    return float(max(swung.max(initial=0.0), twisted.max(initial=0.0)))
 
 
 class JointMotion:

@@ -27,6 +27,7 @@ from crowd.world import World
 from crowd_kernels.aligned import aligned_zeros
 from crowd_kernels.clip import PADDED_JOINTS
 from crowd_kernels.ik import SETTINGS, SolveSettings, scratch_length, solve_crowd
+from crowd_kernels.ik_tree import TreeArrays
 from crowd_kernels.reach import CHUNKS, reach_crowd
 from crowd_kernels.reach_blend import SCRATCH_ROW
 from crowd_kernels.reach_correction import LANES, keep_corrections, start_solves
@@ -170,6 +171,11 @@ class Reach:
         self._iterations = aligned_zeros(capacity, np.int32)
         self.part_seconds = {"blending": 0.0, "inverse kinematics": 0.0}
         """Time that the parts of this layer have taken, s."""
+
+    @property
+    def tree(self) -> TreeArrays:
+        """Joints that inverse kinematics turns for either hand, and their limits."""
+        return self._tree
 
     @property
     def space(self) -> ReachSpace:

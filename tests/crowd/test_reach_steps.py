@@ -3,10 +3,20 @@
 import numpy as np
 import pytest
 
-from crowd.bench.reach import FASTEST, LARGEST_RATIO, LEAST_MET, TOLERANCE, run_batch, run_both, send_on
-from crowd.bench.reachers import Reachers, angular_motion, random_targets, random_turns
+from crowd.bench.reach import (
+    FASTEST,
+    LARGEST_RATIO,
+    LEAST_MET,
+    MOST_BEYOND,
+    TOLERANCE,
+    run_batch,
+    run_both,
+    send_on,
+)
+from crowd.bench.reachers import Reachers, angular_motion, beyond_limits, random_targets, random_turns
 from crowd.motion.rotation import conjugate, from_vector, multiply
 from crowd_kernels.reach_state import OUT_OF_REACH, REACHED
+from tests.oracles import ik as oracle
 
 PEOPLE = 60
 every_rate = pytest.mark.parametrize("rate", [30, 120])
@@ -24,6 +34,7 @@ def allowed(reachers):
 
 
 def check_smooth(reachers, outcome):
+    assert outcome.beyond < MOST_BEYOND
     assert outcome.acceleration < allowed(reachers)
     assert outcome.speed < FASTEST
     away = np.linalg.norm(outcome.place - outcome.target, axis=1)
@@ -131,3 +142,22 @@ def test_people_reach_from_folded_arms_and_go_back_to_them_smoothly(clip, hands,
         shown.append(reachers.local_rotations())
     # For itself this leaves room for what else people do.
     assert angular_motion(np.array(shown), simulation.dt)[1] < reachers.largest_example_acceleration
+
+
+def test_how_far_joints_are_beyond_their_limits_is_what_the_oracle_says(rng):
+    """Of poses whose elbows, wrists and shoulders are far beyond, and of one at rest."""
+    reachers = reachers_at(60)
+    tree = reachers.simulation.reach.tree
+    rotation = reachers.simulation.joint_rotations_local().astype(float)
+    assert beyond_limits(tree, rotation) == 0.0
+    for k in np.flatnonzero((tree.is_limited != 0) & (tree.weight > 0)):
+        turned = rotation[:1].copy()
+        joint = tree.joint[k]
+        turned[0, joint] = multiply(from_vector(rng.normal(0.0, 0.8, 3)), turned[0, joint])
+        swing, twist = oracle.split(tree, k, turned[0, joint])
+        low, high = 2.0 * np.arctan(tree.twist[k].astype(float))
+        beyond = max(twist - high, low - twist, 0.0) if tree.is_free[k, 2] else 0.0
+        share = max(np.linalg.norm(swing * tree.inverse_swing[k]), 1.0)
+        size = np.linalg.norm(swing)
+        beyond = max(beyond, 2.0 * (np.arcsin(size) - np.arcsin(size / share)))
+        assert beyond_limits(tree, turned) == pytest.approx(beyond, abs=1e-5)
